@@ -1,0 +1,60 @@
+"""What the detector says of one thing in one image."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Kind(IntEnum):
+    """What a detection is of."""
+
+    OBJECT = 0
+    FACE = 1
+
+
+@dataclass(frozen=True)
+class Detection:
+    """One object or face in one image.
+
+    `x`, `y`: ray in the optical frame, z = 1 (lens distortion removed). `u`, `v`, `width`,
+    `height`: centre and size of its box in the image [px]. `score`: the weighted sum of Eq. 1 for
+    an object, the detector's confidence for a face. `f_col`, `f_edg`, `f_mot`: the features of
+    Eq. 1, each 0-1. `attended`: a face that stands in the centre while the head is still, of which
+    `face_image` of the same stamp shows the picture.
+    """
+
+    kind: Kind
+    x: float
+    y: float
+    u: float
+    v: float
+    width: float
+    height: float
+    score: float
+    track_id: int = -1
+    f_col: float = 0.0
+    f_edg: float = 0.0
+    f_mot: float = 0.0
+    attended: bool = False
+
+    @property
+    def ray(self) -> NDArray[np.float64]:
+        """Ray (x, y) in the optical frame, shape (2,)."""
+        return np.array([self.x, self.y])
+
+
+def objects(detections: list[Detection]) -> list[Detection]:
+    """The objects among the detections."""
+    return [d for d in detections if d.kind is Kind.OBJECT]
+
+
+def most_salient(detections: list[Detection]) -> Detection | None:
+    """The object i_trg of Eq. 1, or None when no object is in view."""
+    return max(objects(detections), key=lambda d: d.score, default=None)
+
+
+def caregiver_face(detections: list[Detection]) -> Detection | None:
+    """The caregiver's face: the detector reports the caregiver first among faces."""
+    return next((d for d in detections if d.kind is Kind.FACE), None)

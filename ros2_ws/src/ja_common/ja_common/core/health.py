@@ -1,0 +1,94 @@
+"""A node's health: what it waits for, what went wrong; no ROS in here."""
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+
+class Level(IntEnum):
+    """Levels of diagnostic_msgs/DiagnosticStatus."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3
+
+
+@dataclass
+class _Input:
+    expected_every_s: float | None
+    heard: int = 0
+    heard_at_s: float | None = None
+    recent: int = 0
+
+
+@dataclass
+class Report:
+    """One report of a node: the worst level, one sentence, and figures to look at."""
+
+    level: Level
+    message: str
+    values: dict[str, str] = field(default_factory=dict)
+
+
+class Health:
+    """Watches inputs for silence and keeps the last errors; times in seconds, monotonic.
+
+    An error stays in the report for `error_memory_s` after its last occurrence.
+    """
+
+    def __init__(self, now_s: float, error_memory_s: float = 5.0) -> None:
+        self._started_s = now_s
+        self._error_memory_s = error_memory_s
+        self._inputs: dict[str, _Input] = {}
+        self._problems: dict[str, tuple[Level, str, float]] = {}
+        self._reported_s = now_s
+        self.values: dict[str, str] = {}
+
+    def expect(self, name: str, every_s: float | None) -> None:
+        """Watch an input; silence for longer than `every_s` is a WARN (None: never)."""
+        self._inputs[name] = _Input(every_s)
+
+    def heard(self, name: str, now_s: float) -> None:
+        """An input spoke."""
+        entry = self._inputs[name]
+        entry.heard += 1
+        entry.recent += 1
+        entry.heard_at_s = now_s
+
+    def problem(self, where: str, message: str, now_s: float, level: Level = Level.ERROR) -> bool:
+        """Something went wrong; True when it is news (so that the log is not flooded)."""
+        known = self._problems.get(where)
+        news = known is None or known[1] != message or now_s - known[2] > self._error_memory_s
+        self._problems[where] = (level, message, now_s)
+        return news
+
+    def resolved(self, where: str) -> None:
+        """A problem is over."""
+        self._problems.pop(where, None)
+
+    def silent(self, now_s: float) -> dict[str, float]:
+        """Inputs silent for longer than expected, with the time [s] that was allowed."""
+        silence = {}
+        for name, entry in self._inputs.items():
+            since = self._started_s if entry.heard_at_s is None else entry.heard_at_s
+            if entry.expected_every_s is not None and now_s - since > entry.expected_every_s:
+                silence[name] = entry.expected_every_s
+        return silence
+
+    def report(self, now_s: float) -> Report:
+        """Everything in one report; rates are those since the last report."""
+        seconds = max(now_s - self._reported_s, 1e-9)
+        self._reported_s = now_s
+        values = dict(self.values)
+        for name, entry in self._inputs.items():
+            values[f'{name} received'] = str(entry.heard)
+            values[f'{name} rate [1/s]'] = f'{entry.recent / seconds:.1f}'
+            entry.recent = 0
+        self._problems = {
+            where: problem
+            for where, problem in self._problems.items()
+            if now_s - problem[2] <= self._error_memory_s
+        }
+        found = [(level, message) for level, message, _ in self._problems.values()]
+        worst = max((level for level, _ in found), default=Level.OK)
+        return Report(worst, '; '.join(text for _, text in found) or 'OK', values)

@@ -1,0 +1,133 @@
+"""The head's posture at the moment an image was taken, from the stream of joint states."""
+
+from bisect import bisect_left
+from collections import deque
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ja_common.core.stamps import NS_PER_S
+
+Item = TypeVar('Item')
+
+
+@dataclass(frozen=True)
+class Posture:
+    """Posture of the head at a stamp: position and speed of (pan, tilt) [rad, rad/s]."""
+
+    stamp_ns: int
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+    def is_still(self, still_below_rad_s: float) -> bool:
+        """Are both joints slower than the given speed [rad/s]?"""
+        return bool(np.all(np.abs(self.velocity) < still_below_rad_s))
+
+
+class PostureHistory:
+    """Joint states of the last seconds, interpolated linearly at any stamp among them.
+
+    Out-of-order samples are put in order, duplicates are dropped. A sample older than everything
+    kept means that the clock was set back: the history starts again from it.
+    """
+
+    def __init__(self, horizon_s: float = 2.0) -> None:
+        self._horizon_ns = int(horizon_s * NS_PER_S)
+        self._stamps: list[int] = []
+        self._samples: list[Posture] = []
+
+    def add(self, stamp_ns: int, position: ArrayLike, velocity: ArrayLike | None = None) -> None:
+        """Add a sample: position (2,) [rad], and velocity (2,) [rad/s] where the encoder gives it.
+
+        Raises ValueError for values that are not two finite numbers; nothing is then added.
+        """
+        position = _two_finite('joint position', position)
+        if self._stamps and stamp_ns < self._stamps[-1] - self._horizon_ns:
+            self.clear()
+        index = bisect_left(self._stamps, stamp_ns)
+        if index < len(self._stamps) and self._stamps[index] == stamp_ns:
+            return
+        if velocity is not None:
+            velocity = _two_finite('joint velocity', velocity)
+        elif index:
+            before = self._samples[index - 1]
+            seconds = (stamp_ns - before.stamp_ns) / NS_PER_S
+            velocity = (position - before.position) / seconds
+        else:
+            velocity = np.zeros(2)
+        self._stamps.insert(index, stamp_ns)
+        self._samples.insert(index, Posture(stamp_ns, position, velocity))
+        expired = bisect_left(self._stamps, self._stamps[-1] - self._horizon_ns)
+        del self._stamps[:expired], self._samples[:expired]
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._stamps.clear()
+        self._samples.clear()
+
+    @property
+    def newest(self) -> Posture | None:
+        """The latest sample; for an image use `at` with the image's stamp, never this."""
+        return self._samples[-1] if self._samples else None
+
+    def at(self, stamp_ns: int) -> Posture | None:
+        """Posture at a stamp; None when the stamp lies outside of what is known (yet)."""
+        index = bisect_left(self._stamps, stamp_ns)
+        if index == len(self._stamps):
+            return None
+        after = self._samples[index]
+        if after.stamp_ns == stamp_ns:
+            return after
+        if index == 0:
+            return None
+        before = self._samples[index - 1]
+        share = (stamp_ns - before.stamp_ns) / (after.stamp_ns - before.stamp_ns)
+        return Posture(
+            stamp_ns,
+            before.position + share * (after.position - before.position),
+            before.velocity + share * (after.velocity - before.velocity),
+        )
+
+
+class PostureJoin(Generic[Item]):
+    """Holds stamped items until the posture at their stamp is known, and gives them in order.
+
+    An item whose posture can no longer become known (older than the history, or more than
+    `depth` items waiting) is given with None, so that the caller can say so: nothing is lost.
+    """
+
+    def __init__(self, history: PostureHistory, depth: int = 32) -> None:
+        self._history = history
+        self._depth = depth
+        self._waiting: deque[tuple[int, Item]] = deque()
+
+    def add(self, stamp_ns: int, item: Item) -> None:
+        """Let an item wait for its posture."""
+        self._waiting.append((stamp_ns, item))
+
+    def ready(self) -> list[tuple[Item, Posture | None]]:
+        """Items whose waiting is over, oldest first, with their posture (None: unknowable)."""
+        done: list[tuple[Item, Posture | None]] = []
+        while self._waiting:
+            stamp_ns, item = self._waiting[0]
+            posture = self._history.at(stamp_ns)
+            newest = self._history.newest
+            still_to_come = newest is None or newest.stamp_ns < stamp_ns
+            if posture is None and still_to_come and len(self._waiting) <= self._depth:
+                break
+            self._waiting.popleft()
+            done.append((item, posture))
+        return done
+
+    def clear(self) -> None:
+        """Forget all that waits."""
+        self._waiting.clear()
+
+
+def _two_finite(what: str, values: ArrayLike) -> NDArray[np.float64]:
+    array = np.array(values, float)
+    if array.shape != (2,) or not np.all(np.isfinite(array)):
+        raise ValueError(f'{what} must be two finite numbers (pan, tilt), got {values!r}')
+    return array

@@ -1,0 +1,41 @@
+"""Waits until every expected topic has spoken about the same image."""
+
+from collections.abc import Iterable
+from typing import Any
+
+
+class StampJoin:
+    """Collects one value a key for each stamp, and gives the set when it is complete.
+
+    Sets older than the newest complete one can no longer matter and are dropped, as is the oldest
+    incomplete one beyond `depth`. A completed stamp that is heard again (the same image repeated)
+    starts a new set.
+    """
+
+    def __init__(self, keys: Iterable[str], depth: int = 32) -> None:
+        self._keys = frozenset(keys)
+        self._depth = depth
+        self._sets: dict[int, dict[str, Any]] = {}
+
+    def add(self, key: str, stamp_ns: int, value: Any) -> dict[str, Any] | None:
+        """Add a value; the complete set {key: value} for its stamp, or None while some lack."""
+        if key not in self._keys:
+            raise KeyError(f'{key!r} is not one of {sorted(self._keys)}')
+        collected = self._sets.setdefault(stamp_ns, {})
+        collected[key] = value
+        if len(collected) == len(self._keys):
+            self._sets = {stamp: kept for stamp, kept in self._sets.items() if stamp > stamp_ns}
+            return collected
+        if len(self._sets) > self._depth:
+            del self._sets[min(self._sets)]
+        return None
+
+    def missing(self) -> frozenset[str]:
+        """Keys that the newest incomplete set still lacks (all keys when nothing waits)."""
+        if not self._sets:
+            return self._keys
+        return self._keys - self._sets[max(self._sets)].keys()
+
+    def clear(self) -> None:
+        """Forget all incomplete sets."""
+        self._sets.clear()

@@ -1,0 +1,177 @@
+"""The base of every node: hear, say, offer; parameters, health, a clean end."""
+
+import sys
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+
+from ja_common.core.config import ConfigError
+from ja_common.core.health import Health, Level
+from ja_common.parameters import declare_config
+from ja_common.ros_defaults import apply_ros_defaults
+from ja_common.topics import DIAGNOSTICS, Topic
+
+Config = TypeVar('Config')
+
+
+class GraphNode(Node):
+    """A node that outlives bad input, reports its health at 1 Hz and says what it misses.
+
+    Callbacks may raise ValueError with one clear sentence for input that cannot be used: it is
+    logged with the topic's name (news only), shown in /diagnostics, and the node lives on.
+    """
+
+    def __init__(self, name: str, **node_kwargs: Any) -> None:
+        super().__init__(name, **node_kwargs)
+        self.health = Health(time.monotonic())
+        self._heard_topics: dict[str, Topic] = {}
+        self._diagnostics = self.say(DIAGNOSTICS)
+        # Wall time, not /clock: a simulation that stands still must be reported as well.
+        self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def configure(
+        self, config_class: type[Config], changed: Callable[[Config], None] | None = None
+    ) -> Config:
+        """Declare a configuration dataclass as this node's parameters; see `declare_config`."""
+        return declare_config(self, config_class, changed)
+
+    def say(self, topic: Topic) -> Publisher:
+        """A publisher of a topic."""
+        return self.create_publisher(
+            topic.type,
+            topic.name,
+            topic.says,
+            event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
+        )
+
+    def hear(
+        self,
+        topic: Topic,
+        callback: Callable[[Any], None],
+        expected_every_s: float | None = None,
+    ) -> None:
+        """Subscribe; when silent for longer than `expected_every_s` [s, wall time], warn why."""
+
+        def guarded(message: Any) -> None:
+            self.health.heard(resolved, time.monotonic())
+            try:
+                callback(message)
+            except ValueError as error:
+                self.problem(resolved, f'{resolved}: {error}')
+            except Exception as error:
+                # Not input but a fault of ours: the node lives on, and the trace is kept.
+                text = f'{resolved}: {type(error).__name__}: {error}\n{traceback.format_exc()}'
+                self.problem(resolved, text)
+
+        # Default event callbacks cost a third of the throughput; `_why_silent` explains instead.
+        subscription = self.create_subscription(
+            topic.type,
+            topic.name,
+            guarded,
+            topic.hears,
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+        )
+        resolved = subscription.topic_name
+        self._heard_topics[resolved] = topic
+        self.health.expect(resolved, expected_every_s)
+
+    def offer(self, service_type: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
+        """A service; a ValueError or OSError of the callback is answered as `success = False`."""
+
+        def guarded(request: Any, response: Any) -> Any:
+            try:
+                return callback(request, response)
+            except (ValueError, OSError) as error:
+                response.success, response.message = False, str(error)
+                return response
+
+        self.create_service(service_type, name, guarded)
+
+    def problem(self, where: str, message: str, level: Level = Level.ERROR) -> None:
+        """Something is wrong: into /diagnostics, and into the log when it is news."""
+        if self.health.problem(where, message, time.monotonic(), level):
+            log = self.get_logger()
+            if level >= Level.ERROR:
+                log.error(message)
+            else:
+                log.warning(message)
+
+    def _report(self) -> None:
+        silent = self.health.silent(time.monotonic())
+        for name in self._heard_topics:
+            where = f'silence of {name}'
+            if name in silent:
+                text = f'no message on {name} for more than {silent[name]:g} s: '
+                self.problem(where, text + self._why_silent(name), Level.WARN)
+            else:
+                self.health.resolved(where)
+        report = self.health.report(time.monotonic())
+        status = DiagnosticStatus(
+            level=bytes([report.level]),
+            name=self.get_fully_qualified_name(),
+            message=report.message,
+            hardware_id=self.get_namespace(),
+            values=[KeyValue(key=key, value=value) for key, value in report.values.items()],
+        )
+        array = DiagnosticArray(status=[status])
+        array.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(array)
+
+    def _why_silent(self, name: str) -> str:
+        publishers = self.get_publishers_info_by_topic(name)
+        if not publishers:
+            return 'nobody publishes it'
+        hears = self._heard_topics[name].hears
+        for publisher in publishers:
+            offered = publisher.qos_profile
+            if (
+                hears.reliability is ReliabilityPolicy.RELIABLE
+                and offered.reliability is ReliabilityPolicy.BEST_EFFORT
+            ) or (
+                hears.durability is DurabilityPolicy.TRANSIENT_LOCAL
+                and offered.durability is DurabilityPolicy.VOLATILE
+            ):
+                return (
+                    f'{publisher.node_name} publishes it with a quality of service that does not '
+                    f'match: {offered.reliability.name} {offered.durability.name} is offered, '
+                    f'{hears.reliability.name} {hears.durability.name} is needed'
+                )
+        return f'{publishers[0].node_name} is its publisher, but says nothing'
+
+
+def spin_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -> None:
+    """The `main` of every node: start, spin until asked to stop, end cleanly.
+
+    Exits with code 2 and one sentence on a configuration that cannot be used.
+    """
+    apply_ros_defaults()
+    node = None
+    try:
+        rclpy.init(args=args)
+        node = make_node()
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except (ConfigError, OSError) as error:
+        print(f'error: {error}', file=sys.stderr)
+        sys.exit(2)
+    finally:
+        # A second Ctrl-C may arrive in here; the node has ended all the same.
+        try:
+            if node is not None:
+                node.destroy_node()
+            rclpy.try_shutdown()
+        except KeyboardInterrupt:
+            pass

@@ -1,0 +1,92 @@
+"""Configuration dataclasses (`ja_common.core.config`) as ROS parameters, with ranges and descriptions."""
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+from typing import Any, TypeVar
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from ja_common.core.config import ConfigError, checked
+
+Config = TypeVar('Config')
+
+_FAR = 1e9
+
+
+def declare_config(
+    node: Node, config_class: type[Config], changed: Callable[[Config], None] | None = None
+) -> Config:
+    """Declare every field of a configuration dataclass as a parameter; the values as one object.
+
+    With `changed` the parameters may be set while the node runs: a bad value is refused with the
+    reason and changes nothing, a good one gives `changed` the new configuration. Without it they
+    are read-only. A whole number is accepted for a float. Raises ConfigError for a bad override.
+    """
+    config_fields = {f.name: f for f in fields(config_class)}  # type: ignore[arg-type]
+    values = {}
+    for name, config_field in config_fields.items():
+        declared = node.declare_parameter(
+            name, config_field.default, _descriptor(config_field, read_only=changed is None)
+        )
+        try:
+            values[name] = checked(config_field, declared.value)
+        except ConfigError as error:
+            raise ConfigError(f'{node.get_fully_qualified_name()}: parameter {error}') from None
+    config = config_class(**values)
+    if changed is None:
+        return config
+
+    current = config
+
+    def updated(parameters: list[Parameter]) -> Config:
+        ours = [p for p in parameters if p.name in config_fields]
+        return replace(  # type: ignore[type-var]
+            current, **{p.name: checked(config_fields[p.name], p.value) for p in ours}
+        )
+
+    def judge(parameters: list[Parameter]) -> SetParametersResult:
+        try:
+            updated(parameters)
+        except (ConfigError, ValueError) as error:
+            return SetParametersResult(successful=False, reason=f'parameter {error}')
+        return SetParametersResult(successful=True)
+
+    def apply(parameters: list[Parameter]) -> None:
+        nonlocal current
+        if any(p.name in config_fields for p in parameters):
+            current = updated(parameters)
+            changed(current)
+
+    node.add_on_set_parameters_callback(judge)
+    node.add_post_set_parameters_callback(apply)
+    return config
+
+
+def _descriptor(config_field: Any, read_only: bool) -> ParameterDescriptor:
+    meta = config_field.metadata
+    low, high = meta.get('low'), meta.get('high')
+    text = meta['description']
+    if meta.get('choices'):
+        text += f' (one of {", ".join(meta["choices"])})'
+    # dynamic_typing lets `1` stand for `1.0`; `checked` then holds the type and the range.
+    descriptor = ParameterDescriptor(
+        name=config_field.name, description=text, dynamic_typing=True, read_only=read_only
+    )
+    if low is not None or high is not None:
+        bounds = (-_FAR if low is None else low, _FAR if high is None else high)
+        if isinstance(config_field.default, float):
+            descriptor.floating_point_range = [
+                FloatingPointRange(from_value=float(bounds[0]), to_value=float(bounds[1]))
+            ]
+        elif isinstance(config_field.default, int):
+            descriptor.integer_range = [
+                IntegerRange(from_value=int(bounds[0]), to_value=int(bounds[1]))
+            ]
+    return descriptor

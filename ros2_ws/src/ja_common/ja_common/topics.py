@@ -1,0 +1,102 @@
+"""Every topic and service of the graph: its name, type, quality of service and purpose.
+
+Names are relative, so namespaces and remaps work. `docs/topics.md` is made from this table.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PointStamped
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState, PointCloud2
+from std_msgs.msg import Float32
+
+
+def _qos(reliable: bool, depth: int, latched: bool = False) -> QoSProfile:
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One topic: who says it speaks with `says`, who hears it listens with `hears`."""
+
+    name: str
+    type: Any
+    purpose: str
+    says: QoSProfile
+    hears: QoSProfile
+
+
+# A sensor speaks reliably and is heard best-effort, so that any camera or rig driver matches.
+# Images are heard with depth 1: an old picture is worth nothing.
+_PICTURE = {'says': _qos(True, 1), 'hears': _qos(False, 1)}
+# Joint states come several to an image, and interpolation wants them all.
+_SENSOR = {'says': _qos(True, 50), 'hears': _qos(False, 50)}
+# Between our own nodes nothing may be lost: one message an image, on every topic.
+_LINK = {'says': _qos(True, 10), 'hears': _qos(True, 10)}
+# For people and tools that come later and want the last word.
+_LATCHED = {'says': _qos(True, 1, latched=True), 'hears': _qos(True, 1, latched=True)}
+
+IMAGE = Topic('image_raw', Image, 'picture of the head camera', **_PICTURE)
+IMAGE_COMPRESSED = Topic(
+    'image_raw/compressed', CompressedImage, 'the same as JPEG or PNG, from rigs', **_PICTURE
+)
+WIDE_IMAGE = Topic(
+    'wide/image_raw', Image, 'wide picture in which the digital head moves its window', **_PICTURE
+)
+CAMERA_INFO = Topic('camera_info', CameraInfo, 'intrinsics of the head camera', **_PICTURE)
+JOINT_STATES = Topic('joint_states', JointState, 'measured posture of the head', **_SENSOR)
+DETECTIONS = Topic(
+    'detections', PointCloud2, 'objects and faces of one image, empty ones too', **_LINK
+)
+TARGET = Topic('target', PointStamped, 'ray to the most salient object (Eq. 1)', **_LINK)
+FACE = Topic('face', PointStamped, "ray to the caregiver's face", **_LINK)
+FACE_IMAGE = Topic(
+    'face_image', Image, "the caregiver's face, 30 rows x 25 columns, while attended", **_LINK
+)
+IMAGE_ANNOTATED = Topic(
+    'image_annotated', Image, 'what the detector sees, drawn while somebody looks', **_PICTURE
+)
+VF_DELTA = Topic(
+    'visual_feedback/delta', JointState, 'change of posture towards the target (Eq. 2)', **_LINK
+)
+FACE_DELTA = Topic(
+    'visual_feedback/face_delta',
+    JointState,
+    "change of posture towards the caregiver's face (Eq. 2)",
+    **_LINK,
+)
+LM_DELTA = Topic(
+    'learning_module/delta', JointState, 'change of posture that the learner proposes', **_LINK
+)
+FIXATION = Topic(
+    'fixation',
+    JointState,
+    'direction of the object that stands in the centre of a still view (Eq. 3)',
+    **_LINK,
+)
+JOINT_COMMANDS = Topic(
+    'joint_commands', JointState, 'absolute posture the head shall take, limited', **_LINK
+)
+GATE_STATUS = Topic(
+    'gate/status', DiagnosticStatus, 'phase, source, p(LM), limits, reason of a hold', **_LINK
+)
+LEARNING_STATUS = Topic(
+    'learning_module/status', DiagnosticStatus, 'trials learned and the last error', **_LINK
+)
+DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, 'health of every node, 1 Hz', **_LINK)
+CLOCK = Topic('/clock', Clock, 'simulated time', says=_qos(True, 10), hears=_qos(False, 1))
+SIM_TRUTH = Topic('sim/truth', PointCloud2, 'where everything is and what she attends to', **_LINK)
+SUCCESS_RATE = Topic(
+    'sim/success_rate', Float32, 'share of recent trials with joint attention', **_LATCHED
+)
+SCORE = Topic('sim/score', DiagnosticStatus, 'the score in full, after every trial', **_LATCHED)
+
+TOPICS = tuple(value for value in list(globals().values()) if isinstance(value, Topic))
