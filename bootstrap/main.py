@@ -1,0 +1,33 @@
+"""`./ja COMMAND`: prepare the environment, then hand over to it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from bootstrap.machine import clean_environ
+from bootstrap.plan import BootstrapError
+from bootstrap.setup_environment import Environment
+
+
+def main(root: Path, args: Sequence[str]) -> int:
+    """Never returns when all is well: the process becomes the command."""
+    testing = list(args[:1]) == ['test']
+    environment = Environment(root, os.environ)
+    try:
+        environment.prepare(dev=testing)
+    except BootstrapError as error:
+        print(f'ja: {error}', file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print('ja: set-up interrupted; the next run goes on from here', file=sys.stderr)
+        return 130
+    if testing:
+        os.chdir(root)
+        command = ['-m', 'pytest', *args[1:]]
+    else:
+        command = ['-m', 'ja_bringup.cli', *args]
+    sys.stdout.flush()
+    os.execve(environment.python, [environment.python, *command], clean_environ(os.environ))

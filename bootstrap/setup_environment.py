@@ -1,0 +1,196 @@
+"""Carry out the plan: system packages, virtual environment, wheels, our packages."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bootstrap import machine
+from bootstrap.plan import (
+    BootstrapError,
+    Python,
+    Step,
+    apt_advice,
+    choose_python,
+    fingerprint,
+    ros_is_sourced,
+    steps_to_do,
+)
+
+STAMP = 'ja-stamp.json'
+_OFFLINE = ('NewConnectionError', 'Failed to establish', 'NameResolution', 'Temporary failure')
+
+
+@dataclass
+class Environment:
+    """The virtual environment of a checkout, and what was done to it (the stamp)."""
+
+    root: Path
+    environ: Mapping[str, str]
+    say: Callable[[str], None] = field(default=lambda text: print(f'ja: {text}', file=sys.stderr))
+
+    @property
+    def folder(self) -> Path:
+        return self.root / '.venv'
+
+    @property
+    def python(self) -> str:
+        return str(self.folder / 'bin' / 'python')
+
+    @property
+    def log(self) -> Path:
+        return self.root / 'runs' / 'setup.log'
+
+    def packages(self) -> list[Path]:
+        return sorted(path.parent for path in self.root.glob('ros2_ws/src/*/setup.py'))
+
+    def prepare(self, dev: bool = False) -> None:
+        """Make everything ready that is not; raises BootstrapError with one clear sentence.
+
+        Safe to interrupt and to run twice at once: a step is stamped when it is done, and one
+        process works at a time.
+        """
+        sourced = ros_is_sourced(self.environ)
+        if self._is_ready(sourced, dev):
+            return
+        with self._only_one():
+            python = self._choose_python(sourced)
+            self._install_system_packages(machine.missing_system_packages(python))
+            for step in steps_to_do(self._steps(python.version, sourced, dev), self._stamp()):
+                self._do(step, python)
+
+    def _is_ready(self, sourced: bool, dev: bool) -> bool:
+        """The quick way, without starting an interpreter."""
+        wanted = self.environ.get('JA_PYTHON')
+        recorded = self._stamp().get('python', {})
+        if not recorded or not os.path.exists(self.python):
+            return False
+        if wanted and shutil.which(wanted) != recorded.get('asked'):
+            return False
+        version = tuple(recorded['version'])
+        return not steps_to_do(self._steps(version, sourced, dev), self._stamp())
+
+    def _steps(self, version: tuple[int, int], sourced: bool, dev: bool) -> list[Step]:
+        """In this order: each stands on those before it."""
+        locks = self.root / 'requirements'
+        base = [] if sourced else ['ros.lock']
+        ros = self.environ.get('AMENT_PREFIX_PATH', '') if sourced else 'wheels'
+        steps = [
+            Step('environment', fingerprint('{}.{}'.format(*version), ros, str(self.root))),
+            *(Step(lock, fingerprint((locks / lock).read_bytes()))
+              for lock in [*base, 'base.lock']),
+            Step('packages', fingerprint(*(
+                (package / name).read_bytes()
+                for package in self.packages() for name in ('setup.py', 'setup.cfg')
+            ))),
+        ]
+        if dev:
+            steps.append(Step('dev.lock', fingerprint((locks / 'dev.lock').read_bytes())))
+        return steps
+
+    def _choose_python(self, sourced: bool) -> Python:
+        existing = self._stamp().get('python', {}).get('executable')
+        candidates = machine.pythons(self.environ, existing)
+        return choose_python(candidates, self.environ.get('JA_PYTHON'), sourced)
+
+    def _install_system_packages(self, names: Sequence[str]) -> None:
+        if not names:
+            return
+        advice = apt_advice(names, machine.is_root(), machine.has_apt())
+        if advice:
+            raise BootstrapError(advice)
+        self.say(f'installing system packages: {" ".join(names)}')
+        apt = {**self.environ, 'DEBIAN_FRONTEND': 'noninteractive'}
+        self._run(['apt-get', 'update'], apt)
+        self._run(['apt-get', 'install', '-y', '--no-install-recommends', *names], apt)
+
+    def _do(self, step: Step, python: Python) -> None:
+        began = time.monotonic()
+        if step.name == 'environment':
+            self.say('making the virtual environment .venv (Python {}.{})'.format(*python.version))
+            self._write_stamp({})
+            self._run([python.executable, '-m', 'venv', '--clear', str(self.folder)])
+            asked = shutil.which(self.environ.get('JA_PYTHON', '')) or python.executable
+            self._record('python', {
+                'executable': python.executable, 'version': python.version, 'asked': asked,
+            })
+        elif step.name == 'packages':
+            self.say('installing the packages of ros2_ws')
+            self._pip('--no-deps', '--no-build-isolation', '--use-pep517',
+                      # A plain path entry: quick to import, and followed by mypy and editors.
+                      '--config-settings', 'editable_mode=compat',
+                      *(part for package in self.packages() for part in ('-e', str(package))))
+        else:
+            lock = self.root / 'requirements' / step.name
+            self.say(f'installing requirements/{step.name} (the first time takes minutes)')
+            self._pip('--prefer-binary', '-r', str(lock))
+        self._record(step.name, step.fingerprint)
+        self.say(f'  done in {time.monotonic() - began:.0f} s')
+
+    def _pip(self, *args: str) -> None:
+        self._run([self.python, '-m', 'pip', '--disable-pip-version-check', 'install', *args])
+
+    def _run(self, command: Sequence[str], environ: Mapping[str, str] | None = None) -> None:
+        """Run a command, its output into the log; raises BootstrapError when it fails."""
+        self.log.parent.mkdir(exist_ok=True)
+        with self.log.open('a', encoding='utf-8') as log:
+            start = log.tell()
+            log.write(f'$ {" ".join(command)}\n')
+            log.flush()
+            try:
+                result = subprocess.run(
+                    command,
+                    env=machine.clean_environ(environ or self.environ),
+                    stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, check=False,
+                )
+            except OSError as error:
+                raise BootstrapError(f'{command[0]} cannot be started: {error}') from error
+        if result.returncode:
+            with self.log.open(encoding='utf-8', errors='replace') as log:
+                log.seek(start)
+                raise BootstrapError(self._why(command, log.read()))
+
+    def _why(self, command: Sequence[str], output: str) -> str:
+        if any(sign in output for sign in _OFFLINE):
+            return (
+                'the first set-up needs the network to fetch its packages, and could not reach '
+                f'it: connect, then run the same command again (log: {self.log})'
+            )
+        errors = [line for line in output.splitlines() if line.lower().startswith(('error', 'e:'))]
+        last = errors[-1] if errors else output.strip().rsplit('\n', 1)[-1]
+        return f'{" ".join(command[:4])} ... failed: {last} (log: {self.log})'
+
+    def _stamp(self) -> dict:
+        try:
+            stamp = json.loads((self.folder / STAMP).read_text())
+        except (OSError, ValueError):
+            return {}
+        return stamp if isinstance(stamp, dict) else {}
+
+    def _record(self, name: str, value: object) -> None:
+        self._write_stamp({**self._stamp(), name: value})
+
+    def _write_stamp(self, stamp: dict) -> None:
+        self.folder.mkdir(exist_ok=True)
+        temporary = self.folder / f'{STAMP}.new'
+        temporary.write_text(json.dumps(stamp, indent=1))
+        temporary.replace(self.folder / STAMP)
+
+    @contextlib.contextmanager
+    def _only_one(self) -> Iterator[None]:
+        with (self.root / '.ja.lock').open('w') as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                self.say('another set-up is under way; waiting for it')
+                fcntl.flock(lock, fcntl.LOCK_EX)
+            yield

@@ -1,0 +1,1 @@
+"""Starts the graph: composition, configuration, supervision, progress, benchmarks."""

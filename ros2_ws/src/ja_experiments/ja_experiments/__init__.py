@@ -1,0 +1,1 @@
+"""The paper's figures, ablations and sweeps, over the cores of the other packages."""

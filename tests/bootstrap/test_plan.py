@@ -1,0 +1,83 @@
+"""The decisions of the set-up, without a set-up."""
+
+import pytest
+
+from bootstrap.plan import (
+    BootstrapError,
+    Python,
+    Step,
+    apt_advice,
+    choose_python,
+    fingerprint,
+    ros_is_sourced,
+    steps_to_do,
+)
+
+OLD = Python('/usr/bin/python3.9', (3, 9))
+P311 = Python('/usr/bin/python3.11', (3, 11))
+P312 = Python('/usr/bin/python3.12', (3, 12), has_rclpy=True)
+NEW = Python('/usr/bin/python3.14', (3, 14))
+
+
+def test_the_first_supported_python_is_chosen():
+    assert choose_python([OLD, NEW, P311, P312]) is P311
+
+
+def test_with_ros_sourced_the_python_of_its_rclpy_is_chosen():
+    assert choose_python([P311, P312], sourced=True) is P312
+    with pytest.raises(BootstrapError, match='can import its rclpy'):
+        choose_python([P311], sourced=True)
+
+
+@pytest.mark.parametrize('candidates', [[], [OLD], [OLD, NEW]])
+def test_without_a_supported_python_the_message_names_the_range(candidates):
+    with pytest.raises(BootstrapError, match=r'Python 3\.10 to 3\.13 is needed.*JA_PYTHON'):
+        choose_python(candidates)
+
+
+def test_a_wrong_ja_python_is_named():
+    with pytest.raises(BootstrapError, match=r'JA_PYTHON=python3\.9 is of another version'):
+        choose_python([OLD], wanted='python3.9')
+    with pytest.raises(BootstrapError, match='JA_PYTHON=nonsense is not a Python'):
+        choose_python([], wanted='nonsense')
+
+
+def test_only_jazzy_may_be_sourced():
+    assert not ros_is_sourced({})
+    assert ros_is_sourced({'ROS_DISTRO': 'jazzy'})
+    with pytest.raises(BootstrapError, match='ROS 2 humble is sourced'):
+        ros_is_sourced({'ROS_DISTRO': 'humble'})
+
+
+STEPS = [Step('environment', 'e1'), Step('base.lock', 'b1'), Step('packages', 'p1')]
+
+
+def test_a_fresh_checkout_needs_every_step_and_a_ready_one_none():
+    assert steps_to_do(STEPS, {}) == STEPS
+    assert steps_to_do(STEPS, {step.name: step.fingerprint for step in STEPS}) == []
+
+
+def test_an_interrupted_setup_goes_on_where_it_stopped():
+    assert steps_to_do(STEPS, {'environment': 'e1'}) == STEPS[1:]
+
+
+def test_only_what_changed_is_done_again():
+    stamp = {'environment': 'e1', 'base.lock': 'b1', 'packages': 'p0'}
+    assert steps_to_do(STEPS, stamp) == [STEPS[2]]
+
+
+def test_a_new_environment_has_to_be_filled_again():
+    stamp = {'environment': 'e0', 'base.lock': 'b1', 'packages': 'p1'}
+    assert steps_to_do(STEPS, stamp) == STEPS
+
+
+def test_the_fingerprint_separates_its_parts():
+    assert fingerprint('ab', 'c') != fingerprint('a', 'bc')
+    assert fingerprint('ab', b'c') == fingerprint('ab', 'c')
+
+
+def test_apt_advice_gives_the_exact_command_to_those_who_lack_the_right():
+    assert apt_advice(['libegl1'], is_root=True, has_apt=True) is None
+    command = 'sudo apt-get update && sudo apt-get install -y libegl1 libgl1-mesa-dri'
+    assert command in apt_advice(['libegl1', 'libgl1-mesa-dri'], is_root=False, has_apt=True)
+    assert 'package manager' in apt_advice(['libegl1'], is_root=True, has_apt=False)

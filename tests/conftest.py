@@ -1,0 +1,47 @@
+"""Fixtures of the node tests: a domain of its own, a private context."""
+
+import os
+import random
+import socket
+from collections.abc import Iterator
+
+import pytest
+import rclpy
+from rclpy.context import Context
+
+from ja_common.ros_defaults import apply_ros_defaults
+
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+apply_ros_defaults()
+
+# Not the first ids, which people use by hand; above 101 the ports of DDS leave the safe range.
+DOMAINS = range(50, 102)
+_LOCK_PORT = 32768
+
+
+@pytest.fixture
+def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A ROS_DOMAIN_ID that no other test of this machine uses, also in os.environ.
+
+    It is held by a listening socket, which the system releases however the test ends. A fresh
+    one for each test: no test hears what another left behind.
+    """
+    for candidate in random.Random().sample(DOMAINS, len(DOMAINS)):
+        with socket.socket() as lock:
+            try:
+                lock.bind(('127.0.0.1', _LOCK_PORT + candidate))
+            except OSError:
+                continue
+            monkeypatch.setenv('ROS_DOMAIN_ID', str(candidate))
+            yield candidate
+            return
+    raise RuntimeError(f'no free ROS_DOMAIN_ID among {DOMAINS}')
+
+
+@pytest.fixture
+def ros_context(domain: int) -> Iterator[Context]:
+    """An initialised rclpy Context of this test alone, in the test's own domain."""
+    context = Context()
+    rclpy.init(args=[], context=context, domain_id=domain)
+    yield context
+    context.try_shutdown()

@@ -1,0 +1,17 @@
+"""What node tests share: waiting for a condition instead of sleeping for luck."""
+
+import time
+from collections.abc import Callable
+
+from rclpy.executors import Executor
+
+
+def spin_until(
+    executor: Executor, condition: Callable[[], object], timeout_s: float = 10.0
+) -> None:
+    """Spin until the condition holds; AssertionError when it does not within `timeout_s` [s]."""
+    end = time.monotonic() + timeout_s
+    while not condition():
+        if time.monotonic() > end:
+            raise AssertionError(f'condition not met within {timeout_s:g} s')
+        executor.spin_once(timeout_sec=0.05)

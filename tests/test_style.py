@@ -1,0 +1,19 @@
+"""ruff and mypy, as part of the suite: what they find is a failure here, not an opinion."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+
+
+@pytest.mark.parametrize(
+    'tool', [['ruff', 'check', '.', 'ja'], ['mypy']], ids=lambda command: command[0]
+)
+def test_is_clean(tool):
+    result = subprocess.run(
+        [sys.executable, '-m', *tool], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
