@@ -1,0 +1,90 @@
+"""When the caregiver looks where: the course of a trial, seen from her side.
+
+She looks at the robot until the robot looks at her. Then she attends to an object, after a
+reaction time, and keeps attending to it until the robot looks at her again. Nothing here knows
+geometry: the world says how far from her the robot looks and how fast it turns, and asks what she
+attends to.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .scene import CaregiverSpec
+
+ROBOT = -1  # what she attends to when it is no object
+# The robot has left her when it looks this many tolerances away: the same look counts once.
+LEFT_AFTER_TOLERANCES = 1.5
+
+
+@dataclass(frozen=True)
+class Look:
+    """What one look of the robot at her made her do.
+
+    ``attended`` is the index of the object she means; ``reliable`` is False when her gaze goes
+    elsewhere; ``head_share`` is the part of the gaze angle that her head takes, her eyes the rest.
+    """
+
+    trial: int
+    attended: int
+    reliable: bool
+    head_share: float
+    head_noise_rad: tuple[float, float]
+
+
+class CaregiverBehaviour:
+    """Counts the looks at her and decides what she attends to."""
+
+    def __init__(self, spec: CaregiverSpec, rng: np.random.Generator) -> None:
+        self._spec = spec
+        self._rng = rng
+        self.look = Look(0, ROBOT, True, 1.0, (0.0, 0.0))
+        self._started_s = -math.inf  # when the present trial began
+        self._armed = True  # the robot has looked elsewhere since the last look
+        self._robot_stayed = True  # it has not left her since the trial began
+
+    def update(self, now_s: float, offset_rad: float, speed_rad_s: float, objects: int) -> bool:
+        """Take note of where the robot looks; True if a new trial begins now.
+
+        ``offset_rad`` is the angle between its camera axis and her face, ``speed_rad_s`` how fast
+        its head turns, ``objects`` how many there are to choose from.
+        """
+        tolerance = math.radians(self._spec.eye_contact_deg)
+        if offset_rad > LEFT_AFTER_TOLERANCES * tolerance:
+            self._armed, self._robot_stayed = True, False
+        looked_back = now_s - self._started_s > self._spec.patience_s + self._look_back_s
+        if self._robot_stayed and looked_back:
+            self._armed = True
+        still = speed_rad_s < math.radians(self._spec.eye_contact_speed_deg_s)
+        if not (self._armed and still and offset_rad < tolerance):
+            return False
+        self._armed, self._robot_stayed, self._started_s = False, True, now_s
+        self.look = self._choose(objects)
+        return True
+
+    def attends_to(self, now_s: float) -> int:
+        """Index of the object she looks at now, or ROBOT."""
+        since = now_s - self._started_s
+        tired_s = self._spec.patience_s if self._robot_stayed else self._spec.attention_s
+        return self.look.attended if since < max(tired_s, self._spec.reaction_s) else ROBOT
+
+    @property
+    def _look_back_s(self) -> float:
+        """How long she looks at a robot that keeps staring before she tries another object."""
+        return self._spec.reaction_s + self._spec.turn_s
+
+    def _choose(self, objects: int) -> Look:
+        """Another object than before, and how she will turn to it."""
+        rng, spec = self._rng, self._spec
+        others = [index for index in range(objects) if index != self.look.attended]
+        noise = rng.normal(0.0, math.radians(spec.head_noise_deg), 2)
+        return Look(
+            trial=self.look.trial + 1,
+            attended=int(rng.choice(others or [0])),
+            reliable=bool(rng.random() < spec.reliability),
+            head_share=float(rng.uniform(*spec.head_share)),
+            head_noise_rad=(float(noise[0]), float(noise[1])),
+        )

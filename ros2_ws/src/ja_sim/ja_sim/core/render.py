@@ -1,0 +1,93 @@
+"""Pictures without a display: an OpenGL context of its own, and the camera model.
+
+MuJoCo draws through EGL (Mesa's software rasteriser needs no GPU) or, where EGL is missing,
+through OSMesa. ``MUJOCO_GL=egl`` or ``osmesa`` overrules the choice.
+"""
+
+from __future__ import annotations
+
+import ctypes.util
+import importlib
+import os
+import weakref
+from typing import Any
+
+import mujoco
+import numpy as np
+
+_LIBRARIES = {'egl': 'EGL', 'osmesa': 'OSMesa'}
+_ADVICE = (
+    'no OpenGL for rendering: install EGL with Mesa '
+    '(Debian, Ubuntu: apt install libegl1 libgl1-mesa-dri)'
+)
+
+
+class RenderError(RuntimeError):
+    """Nothing can be drawn on this machine; the message names what to install."""
+
+
+def _make_context(width: int, height: int) -> Any:
+    wanted = os.environ.get('MUJOCO_GL', '').lower()
+    if wanted and wanted not in _LIBRARIES:
+        raise RenderError(f"MUJOCO_GL={wanted}: the world renders with 'egl' or 'osmesa'")
+    for name in [wanted] if wanted else list(_LIBRARIES):
+        if ctypes.util.find_library(_LIBRARIES[name]):
+            try:
+                context = importlib.import_module(f'mujoco.{name}').GLContext(width, height)
+                context.make_current()
+                return context
+            except Exception as error:  # the bindings raise whatever the driver gives them
+                raise RenderError(f'{_ADVICE}; {name} said: {error}') from error
+    raise RenderError(_ADVICE)
+
+
+class Renderer:
+    """Draws one camera of a compiled scene into an image (H, W, 3) uint8, RGB."""
+
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, camera: str, image_size: tuple[int, int]
+    ) -> None:
+        """``image_size`` is (width, height) [px]. Raises RenderError if nothing can be drawn."""
+        width, height = image_size
+        self._model, self._data = model, data
+        self._viewport = mujoco.MjrRect(0, 0, width, height)
+        self._image = np.empty((height, width, 3), np.uint8)
+        self._gl = _make_context(width, height)
+        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50)
+        # Also at exit, while OpenGL can still be called.
+        self._free = weakref.finalize(self, _free, self._context, self._gl)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+        self._scene = mujoco.MjvScene(model, maxgeom=1000)
+        self._options = mujoco.MjvOption()
+        self._camera = mujoco.MjvCamera()
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        self._camera.fixedcamid = model.camera(camera).id
+        mujoco.mj_forward(model, data)
+        if self.draw().std() < 1.0:
+            raise RenderError(f'{_ADVICE}; the driver that is there draws empty images')
+
+    def draw(self) -> np.ndarray:
+        """Draw the scene as it stands (kinematics must be current)."""
+        self._gl.make_current()
+        mujoco.mjv_updateScene(
+            self._model,
+            self._data,
+            self._options,
+            None,
+            self._camera,
+            mujoco.mjtCatBit.mjCAT_ALL,
+            self._scene,
+        )
+        mujoco.mjr_render(self._viewport, self._scene, self._context)
+        mujoco.mjr_readPixels(self._image, None, self._viewport, self._context)
+        return self._image[::-1].copy()  # OpenGL's first row is the lowest
+
+    def close(self) -> None:
+        """Give the graphics memory back."""
+        self._free()
+
+
+def _free(context: mujoco.MjrContext, gl: Any) -> None:
+    gl.make_current()
+    context.free()
+    gl.free()

@@ -1,0 +1,292 @@
+"""The simulated world as a class: reset, command, step, observe. No ROS.
+
+The robot's side is what a rig would give: pictures and encoder readings. ``truth()`` is for the
+scorer alone; nothing that learns may call it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from importlib import resources
+
+import mujoco
+import numpy as np
+
+from ja_common.core.geometry import angle_between, directions_of_vectors, head_rotation
+
+from .behaviour import ROBOT, CaregiverBehaviour
+from .camera import Intrinsics, Observation, expose
+from .caregiver import CaregiverBodies
+from .gaze import GazePose, GazeShift
+from .head import JointSample, PanTiltHead
+from .objects import Arrangement, ObjectBodies, Thing
+from .render import Renderer
+from .scene import Scene
+
+START_NS = 1_000_000_000  # a stamp of zero means 'no time' in ROS
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What only the scorer may know, at one instant. Positions [m] in the base frame.
+
+    ``attended`` is an index into ``object_ids`` (N,), ``positions`` (N, 3) and ``directions``
+    (N, 2) [rad], -1 before the first trial. ``face_direction`` (2,) [rad] is where her face is,
+    ``head`` (2,) her head's yaw and pitch (positive to her left, and down), ``gaze_target`` (3,)
+    the point she looks at. ``in_view_at_look`` tells whether the robot, when it looked at her and
+    the trial began, had the attended object in view.
+    """
+
+    stamp_ns: int
+    trial: int
+    attended: int
+    object_ids: np.ndarray
+    positions: np.ndarray
+    directions: np.ndarray
+    face_direction: np.ndarray
+    head: np.ndarray
+    gaze_target: np.ndarray
+    reliable: bool
+    in_view_at_look: bool
+    posture: np.ndarray
+
+
+@dataclass(frozen=True)
+class _View:
+    """All that one exposure depends on, so that a late picture shows the world as it was."""
+
+    stamp_ns: int
+    posture: np.ndarray
+    velocity: np.ndarray
+    gaze: GazePose
+    things: list[Thing]
+    positions: np.ndarray
+
+
+class JointAttentionWorld:
+    """A camera head, a caregiver and objects. Same seed and same commands, same pictures."""
+
+    def __init__(self, scene: Scene, seed: int, image_size: tuple[int, int] = (320, 240)) -> None:
+        """``image_size`` is (width, height) [px]. Raises RenderError without OpenGL."""
+        self.scene = scene
+        self.intrinsics = Intrinsics.of_view(scene.head, image_size)
+        self.clamped = False
+        self._seed = seed
+        self._head = PanTiltHead(scene.head)
+        spec = _room(scene)
+        self._caregiver = CaregiverBodies(spec, scene.caregiver)
+        self._objects = ObjectBodies(spec, scene.objects.count)
+        _add_camera(spec, self.intrinsics)
+        self._model = spec.compile()
+        self._data = mujoco.MjData(self._model)
+        self._caregiver.bind(self._model)
+        table = self._model.geom('table')
+        self._objects.bind(self._model, float(table.pos[2] + table.size[2]))
+        self._camera_mocap = self._model.body('camera').mocapid[0]
+        self._renderer: Renderer | None = None
+        self.reset()
+
+    @property
+    def limits(self) -> np.ndarray:
+        """Lowest and highest posture, (2, 2) [rad]: one row each for pan and tilt."""
+        return self._head.limits
+
+    @property
+    def now_ns(self) -> int:
+        """Simulated time [ns]."""
+        return self._now_ns
+
+    def reset(self, seed: int | None = None) -> None:
+        """Start again at time zero, with another seed if one is given."""
+        self._seed = self._seed if seed is None else seed
+        streams = np.random.SeedSequence(self._seed).spawn(4)
+        objects, behaviour, self._encoder_rng, self._image_rng = map(
+            np.random.default_rng, streams
+        )
+        self._now_ns = START_NS
+        self.clamped = False
+        self._head.reset()
+        caregiver = self._caregiver
+        self._gaze = GazeShift(caregiver.eyes, caregiver.to_rest_frame(np.zeros(3)))
+        face = caregiver.face_position(self._gaze.pose(0.0))
+        self._arrangement = Arrangement(self.scene.objects, face, objects)
+        self._behaviour = CaregiverBehaviour(self.scene.caregiver, behaviour)
+        self._attended, self._elsewhere, self._in_view = ROBOT, np.zeros(3), False
+        self._film: deque[_View] = deque([self._view()])
+        self._observation: Observation | None = None
+        self._sample = self._head.read_encoders(self._now_ns, self._encoder_rng)
+
+    def command(self, posture: np.ndarray) -> None:
+        """Send the head to a posture (2,) [rad]; ``clamped`` then tells if it was out of limits.
+
+        Raises ValueError, and leaves the head as it was, if the posture is not two finite numbers.
+        """
+        posture = np.asarray(posture, float)
+        if posture.shape != (2,) or not np.all(np.isfinite(posture)):
+            raise ValueError(
+                f'a posture is two finite angles (pan, tilt) [rad], not {posture.tolist()}'
+            )
+        self.clamped = self._head.command(posture)
+
+    def step(self, dt: float) -> None:
+        """Let ``dt`` [s] pass: servos, caregiver, objects, and the camera at its own rate."""
+        if not (math.isfinite(dt) and dt > 0.0):
+            raise ValueError(f'a time step must be a positive number of seconds, not {dt}')
+        end_ns = self._now_ns + round(dt * 1e9)
+        rate = self.scene.head.camera_rate_hz
+        if rate:
+            frame = math.floor((self._now_ns - START_NS) * 1e-9 * rate + 1e-6) + 1
+            while (exposure_ns := START_NS + round(frame / rate * 1e9)) <= end_ns:
+                self._advance_to(exposure_ns)
+                self._film.append(self._view())
+                frame += 1
+        self._advance_to(end_ns)
+        if not rate:
+            self._film.append(self._view())
+        seen_ns = end_ns - round(self.scene.head.camera_latency_s * 1e9)
+        while len(self._film) > 1 and self._film[1].stamp_ns <= seen_ns:
+            self._film.popleft()
+        self._sample = self._head.read_encoders(self._now_ns, self._encoder_rng)
+
+    def observe(self) -> Observation:
+        """The newest picture that has left the camera; its stamp is the time of exposure."""
+        view = self._film[0]
+        if self._observation is None or self._observation.stamp_ns != view.stamp_ns:
+            sharp = self._draw(view)
+            image = expose(sharp, view.velocity, self.intrinsics, self.scene.head, self._image_rng)
+            self._observation = Observation(image, view.stamp_ns, self.intrinsics)
+        return self._observation
+
+    def joint_state(self) -> JointSample:
+        """The newest reading of the encoders."""
+        return self._sample
+
+    def truth(self) -> Truth:
+        """For the scorer only."""
+        positions = self._positions()
+        look = self._behaviour.look
+        face = self._caregiver.face_position(self._gaze.pose(self._time_s, self._target_now()))
+        return Truth(
+            stamp_ns=self._now_ns,
+            trial=look.trial,
+            attended=look.attended,
+            object_ids=np.array([thing.identifier for thing in self._arrangement.things]),
+            positions=positions,
+            directions=directions_of_vectors(positions),
+            face_direction=directions_of_vectors(face),
+            head=self._gaze.pose(self._time_s).head,
+            gaze_target=self._gaze_point(),
+            reliable=look.reliable,
+            in_view_at_look=self._in_view,
+            posture=self._head.posture,
+        )
+
+    def close(self) -> None:
+        """Free the graphics context."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    @property
+    def _time_s(self) -> float:
+        return (self._now_ns - START_NS) * 1e-9
+
+    def _advance_to(self, now_ns: int) -> None:
+        self._now_ns = now_ns
+        self._head.advance_to(self._time_s)
+        face = self._caregiver.face_position(self._gaze.pose(self._time_s))
+        offset = float(angle_between(self._head.posture, directions_of_vectors(face)))
+        speed = float(np.linalg.norm(self._head.velocity))
+        count = len(self._arrangement.things)
+        began = self._behaviour.update(self._time_s, offset, speed, count)
+        if began:
+            self._arrangement.rearrange()
+            self._elsewhere = self._arrangement.draw_place()
+        attended = self._behaviour.attends_to(self._time_s)
+        if began or attended != self._attended:
+            self._attended = attended
+            self._turn_to_attended()
+        if began:
+            directions = directions_of_vectors(self._positions())
+            self._in_view = self._is_in_view(directions[attended])
+
+    def _turn_to_attended(self) -> None:
+        behaviour, spec = self._behaviour, self.scene.caregiver
+        share, noise = behaviour.look.head_share, np.array(behaviour.look.head_noise_rad)
+        if self._attended == ROBOT:
+            share, noise = 1.0, np.zeros(2)
+        target = self._caregiver.to_rest_frame(self._gaze_point())
+        self._gaze.start(self._time_s + spec.reaction_s, spec.turn_s, target, share, noise)
+
+    def _gaze_point(self) -> np.ndarray:
+        """The point she means to look at, (3,) [m]: the robot's camera is the origin."""
+        if self._attended == ROBOT:
+            return np.zeros(3)
+        if not self._behaviour.look.reliable:
+            return self._elsewhere
+        return self._positions()[self._attended]
+
+    def _target_now(self) -> np.ndarray:
+        return self._caregiver.to_rest_frame(self._gaze_point())
+
+    def _positions(self) -> np.ndarray:
+        """Where the objects are now, (N, 3) [m]."""
+        shaken = self._attended if self.scene.caregiver.shows_object == 'shakes' else ROBOT
+        return np.array(
+            [
+                thing.position_at(self._time_s, shaken=index == shaken)
+                for index, thing in enumerate(self._arrangement.things)
+            ]
+        )
+
+    def _is_in_view(self, direction: np.ndarray) -> bool:
+        view = np.radians([self.scene.head.view_pan_deg, self.scene.head.view_tilt_deg])
+        return bool(np.all(np.abs(direction - self._head.posture) < view))
+
+    def _view(self) -> _View:
+        return _View(
+            self._now_ns,
+            self._head.posture,
+            self._head.velocity,
+            self._gaze.pose(self._time_s, self._target_now()),
+            self._arrangement.things,
+            self._positions(),
+        )
+
+    def _draw(self, view: _View) -> np.ndarray:
+        data = self._data
+        self._caregiver.place(data, view.gaze)
+        self._objects.dress(view.things)
+        self._objects.place(data, view.positions)
+        rotation = head_rotation(view.posture)
+        mujoco.mju_mat2Quat(data.mocap_quat[self._camera_mocap], rotation.ravel())
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_camlight(self._model, data)
+        if self._renderer is None:
+            size = (self.intrinsics.width, self.intrinsics.height)
+            self._renderer = Renderer(self._model, data, 'eye', size)
+        return self._renderer.draw()
+
+
+def _room(scene: Scene) -> mujoco.MjSpec:
+    text = (resources.files('ja_sim') / 'assets' / 'room.xml').read_text(encoding='utf-8')
+    spec = mujoco.MjSpec.from_string(text)
+    if not scene.room.furnished:
+        spec.delete(spec.body('furniture'))
+    return spec
+
+
+def _add_camera(spec: mujoco.MjSpec, intrinsics: Intrinsics) -> None:
+    """A camera that looks along x of a body at the origin, with exactly these intrinsics."""
+    size = [intrinsics.width, intrinsics.height]
+    body = spec.worldbody.add_body(name='camera', mocap=True)
+    body.add_camera(
+        name='eye',
+        quat=[0.5, 0.5, -0.5, -0.5],
+        resolution=size,
+        sensor_size=size,
+        focal_pixel=[intrinsics.fx, intrinsics.fy],
+    )
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = size
