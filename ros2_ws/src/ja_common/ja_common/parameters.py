@@ -1,4 +1,4 @@
-"""Configuration dataclasses (`ja_common.core.config`) as ROS parameters, with ranges and descriptions."""
+"""Configuration dataclasses (`ja_common.core.config`) as self-describing ROS parameters."""
 
 from collections.abc import Callable
 from dataclasses import fields, replace

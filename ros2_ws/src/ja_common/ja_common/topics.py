@@ -88,9 +88,6 @@ JOINT_COMMANDS = Topic(
 GATE_STATUS = Topic(
     'gate/status', DiagnosticStatus, 'phase, source, p(LM), limits, reason of a hold', **_LINK
 )
-LEARNING_STATUS = Topic(
-    'learning_module/status', DiagnosticStatus, 'trials learned and the last error', **_LINK
-)
 DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, 'health of every node, 1 Hz', **_LINK)
 CLOCK = Topic('/clock', Clock, 'simulated time', says=_qos(True, 10), hears=_qos(False, 1))
 SIM_TRUTH = Topic('sim/truth', PointCloud2, 'where everything is and what she attends to', **_LINK)

@@ -32,7 +32,7 @@ def head_rotation(posture: ArrayLike) -> NDArray[np.float64]:
 
 
 def directions_of_rays(posture: ArrayLike, rays: ArrayLike) -> NDArray[np.float64]:
-    """Directions, shape (..., 2) [rad], of what is seen at rays, shape (..., 2), from a posture."""
+    """Directions, shape (..., 2) [rad], of things seen at rays (..., 2) from a posture."""
     rays = np.asarray(rays, float)
     in_head = np.stack([np.ones(rays.shape[:-1]), -rays[..., 0], -rays[..., 1]], axis=-1)
     return directions_of_vectors(in_head @ head_rotation(posture).T)

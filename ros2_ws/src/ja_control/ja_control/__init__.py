@@ -1,0 +1,1 @@
+"""Where the head turns: visual feedback (Eq. 2), the gate, the attention cycle, the limits."""

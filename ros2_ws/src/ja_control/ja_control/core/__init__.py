@@ -1,0 +1,1 @@
+"""Control algorithms without ROS."""

@@ -1,0 +1,233 @@
+"""The attention cycle: look at the caregiver, shift, ask whether an object is fixated, look back.
+
+One `step` an image. At every shift the gate draws whether visual feedback (VF) or the learning
+module (LM) turns the head (Nagai et al. 2003, section 2.2.5). A trial is what lies between two
+looks at the caregiver.
+"""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ja_common.core.config import parameter
+from ja_common.core.posture import Posture
+from ja_common.core.stamps import NS_PER_S
+from ja_control.core.gating import Gating
+
+
+class Phase(Enum):
+    """What the head is about."""
+
+    LOOK = 'look'
+    SHIFT = 'shift'
+    SEARCH = 'search'
+    HOME = 'home'
+
+
+class Source(Enum):
+    """Whose proposal moves the head."""
+
+    NONE = 'none'
+    FACE = 'face'
+    VISUAL_FEEDBACK = 'VF'
+    LEARNING_MODULE = 'LM'
+
+
+@dataclass(frozen=True)
+class AttentionCycleConfig:
+    """Times and tolerances of the cycle."""
+
+    dwell_s: float = parameter(
+        0.2, 'time to stay on the centred face before the first shift', low=0.0, high=60.0
+    )
+    look_tolerance_rad: float = parameter(
+        0.03, 'the face is centred when it is nearer to the centre than this', low=1e-3, high=0.5
+    )
+    still_below_rad_s: float = parameter(
+        0.05, 'a joint slower than this stands still', low=1e-4, high=5.0
+    )
+    arrived_within_rad: float = parameter(
+        0.02, 'a shift has arrived when the head stands still this near to its aim',
+        low=1e-4, high=0.5,
+    )  # fmt: skip
+    settle_timeout_s: float = parameter(
+        1.5, 'a shift that has not arrived by then is judged where it stands', low=0.05, high=60.0
+    )
+    max_shifts: int = parameter(
+        5, 'shifts after which a trial without fixation is given up', low=1, high=100
+    )
+    search_after_s: float = parameter(
+        1.0, 'time without a face, looking where it was, before searching', low=0.0, high=60.0
+    )
+    search_period_s: float = parameter(8.0, 'period of the searching sweep', low=0.5, high=120.0)
+    search_pan_rad: float = parameter(
+        0.6, 'amplitude of the searching sweep in pan', low=0.0, high=3.0
+    )
+    search_tilt_rad: float = parameter(
+        0.15, 'amplitude of the searching sweep in tilt', low=0.0, high=1.5
+    )
+    home_pan_rad: float = parameter(0.0, 'home posture: pan', low=-3.15, high=3.15)
+    home_tilt_rad: float = parameter(0.0, 'home posture: tilt', low=-1.57, high=1.57)
+
+
+@dataclass(frozen=True)
+class Percept:
+    """What the gate knows about one image: posture at its stamp, and proposals (2,) [rad] or None.
+
+    `fixation` is the direction (2,) [rad] of the object that stands in the centre, if any does.
+    """
+
+    posture: Posture
+    face_delta: NDArray[np.float64] | None = None
+    vf_delta: NDArray[np.float64] | None = None
+    lm_delta: NDArray[np.float64] | None = None
+    fixation: NDArray[np.float64] | None = None
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What the cycle decided on an image: the posture to take, and why."""
+
+    target: NDArray[np.float64]
+    phase: Phase
+    source: Source
+    p_lm: float
+    trials: int
+    shifts: int
+
+
+class AttentionCycle:
+    """The state of the cycle; every random draw comes from the generator it is given."""
+
+    def __init__(
+        self, config: AttentionCycleConfig, gating: Gating, rng: np.random.Generator
+    ) -> None:
+        self.config = config
+        self.gating = gating
+        self._rng = rng
+        self.trials = 0
+        self._caregiver: NDArray[np.float64] | None = None
+        self._target: NDArray[np.float64] | None = None
+        self._begin(Phase.LOOK)
+
+    def go_home(self) -> None:
+        """Give up what is under way, forget where the caregiver was, and turn home."""
+        self._caregiver = None
+        self._begin(Phase.HOME)
+
+    def restart(self) -> None:
+        """Give up what is under way (after a hold or a jump of the clock) and look again."""
+        self._target = None
+        self._begin(Phase.LOOK)
+
+    def step(self, percept: Percept) -> Decision:
+        """One image: advance the cycle, and say which posture to take."""
+        step = {
+            Phase.LOOK: self._look,
+            Phase.SHIFT: self._shift,
+            Phase.SEARCH: self._search,
+            Phase.HOME: self._home,
+        }[self.phase]
+        step(percept)
+        target = percept.posture.position if self._target is None else self._target
+        return Decision(
+            target, self.phase, self._source, self.gating.p_lm(self.trials), self.trials,
+            self._shifts,
+        )  # fmt: skip
+
+    def _begin(self, phase: Phase) -> None:
+        self.phase = phase
+        self._source = Source.NONE
+        self._shifts = 0
+        self._since_ns: int | None = None
+
+    def _elapsed_s(self, percept: Percept) -> float:
+        if self._since_ns is None:
+            self._since_ns = percept.posture.stamp_ns
+        return (percept.posture.stamp_ns - self._since_ns) / NS_PER_S
+
+    def _look(self, percept: Percept) -> None:
+        face = percept.face_delta
+        if face is None:
+            self._look_where_the_face_was(percept)
+            return
+        self._source = Source.FACE
+        self._caregiver = percept.posture.position + face
+        if math.hypot(*face) > self.config.look_tolerance_rad or not self._still(percept):
+            self._target = self._caregiver
+            self._since_ns = None
+            return
+        # Centred: hold still, so that nothing but the caregiver moves in the picture of the face.
+        if self._elapsed_s(percept) >= self.config.dwell_s:
+            self._begin(Phase.SHIFT)
+            self._draw(percept)
+
+    def _look_where_the_face_was(self, percept: Percept) -> None:
+        self._source = Source.NONE
+        if self._caregiver is not None:
+            self._target = self._caregiver
+        if self._elapsed_s(percept) >= self.config.search_after_s and self._still(percept):
+            self._caregiver = None
+            self._begin(Phase.SEARCH)
+
+    def _shift(self, percept: Percept) -> None:
+        if not self._arrived(percept):
+            return
+        self._shifts += 1
+        if percept.fixation is None and self._shifts < self.config.max_shifts:
+            self._draw(percept)
+            return
+        self.trials += 1
+        self._begin(Phase.LOOK)
+        if self._caregiver is not None:
+            self._target = self._caregiver
+
+    def _draw(self, percept: Percept) -> None:
+        # One draw a shift, whether or not the learner has an answer: the same seed gives the
+        # same sequence of sources.
+        learner_drawn = self._rng.random() < self.gating.p_lm(self.trials)
+        if learner_drawn and percept.lm_delta is not None:
+            self._source, delta = Source.LEARNING_MODULE, percept.lm_delta
+        else:
+            self._source, delta = Source.VISUAL_FEEDBACK, percept.vf_delta
+        here = percept.posture.position
+        self._target = here if delta is None else here + delta
+        self._since_ns = percept.posture.stamp_ns
+
+    def _search(self, percept: Percept) -> None:
+        if percept.face_delta is not None:
+            self._begin(Phase.LOOK)
+            self._look(percept)
+            return
+        c = self.config
+        angle = 2 * math.pi * self._elapsed_s(percept) / c.search_period_s
+        sweep = [c.search_pan_rad * math.sin(angle), c.search_tilt_rad * math.sin(3 * angle)]
+        self._target = self._home_posture() + sweep
+
+    def _home(self, percept: Percept) -> None:
+        self._target = self._home_posture()
+        if self._arrived(percept):
+            self._begin(Phase.LOOK)
+
+    def _home_posture(self) -> NDArray[np.float64]:
+        return np.array([self.config.home_pan_rad, self.config.home_tilt_rad])
+
+    def _still(self, percept: Percept) -> bool:
+        return percept.posture.is_still(self.config.still_below_rad_s)
+
+    def _arrived(self, percept: Percept) -> bool:
+        if self._elapsed_s(percept) >= self.config.settle_timeout_s:
+            return True
+        return (
+            self._target is not None
+            and percept.posture.stamp_ns != self._since_ns
+            and self._still(percept)
+            and _within(percept.posture.position, self._target, self.config.arrived_within_rad)
+        )
+
+
+def _within(a: ArrayLike, b: ArrayLike, tolerance: float) -> bool:
+    return bool(np.all(np.abs(np.subtract(a, b)) < tolerance))

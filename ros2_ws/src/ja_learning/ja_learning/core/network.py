@@ -1,0 +1,120 @@
+"""The learning module of the paper: a 752-7-2 network that learns online by back-propagation."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+
+from ja_common.core.config import parameter
+from ja_learning.core.trial import FACE_SHAPE, Trial
+
+INPUTS = FACE_SHAPE[0] * FACE_SHAPE[1] + 2
+
+
+@dataclass(frozen=True)
+class NetworkConfig:
+    """Size and learning rates; the defaults are a reading of the paper that works."""
+
+    hidden: int = parameter(7, 'hidden units', low=1, high=4096)
+    learning_rate: float = parameter(0.003, 'step of back-propagation', low=0.0, high=10.0)
+    momentum: float = parameter(0.5, 'momentum of back-propagation', low=0.0, high=0.999)
+    pairs: str = parameter(
+        'all',
+        'what a trial teaches: the displacement that remained at all postures, or at the last',
+        choices=('all', 'last'),
+    )
+    angle_scale_rad: float = parameter(
+        float(np.radians(40)), 'angle that stands for 1 at input and output', low=0.01, high=3.15
+    )
+    initial_weight: float = parameter(
+        0.05, 'weights start uniformly within +- this', low=0.0, high=10.0
+    )
+
+
+class ThreeLayerNetwork:
+    """Face image and posture in, change of posture out (section 2.2.4; 30 x 25 + 2, 7, 2 units).
+
+    Hidden units are tanh, outputs linear. One step down the squared error a pair.
+    """
+
+    kind = 'paper'
+
+    def __init__(self, config: NetworkConfig, seed: int) -> None:
+        self.config = config
+        generator = torch.Generator().manual_seed(seed)
+
+        def weights(*shape: int) -> torch.nn.Parameter:
+            span = 2 * torch.rand(shape, generator=generator) - 1
+            return torch.nn.Parameter(config.initial_weight * span)
+
+        self._parameters = {
+            'hidden_weights': weights(config.hidden, INPUTS),
+            'hidden_biases': weights(config.hidden),
+            'output_weights': weights(2, config.hidden),
+            'output_biases': weights(2),
+        }
+        self._optimiser = torch.optim.SGD(
+            self._parameters.values(), lr=config.learning_rate, momentum=config.momentum
+        )
+        self.trials = 0
+        self.last_error_rad = float('nan')
+
+    def predict(self, face: ArrayLike, posture: ArrayLike) -> NDArray[np.float64]:
+        """Proposed change of posture, shape (2,) [rad], for a face (30, 25) uint8 at a posture."""
+        with torch.no_grad():
+            output = self._forward(self._inputs(np.asarray(face), np.atleast_2d(posture)))
+        return output[0].numpy().astype(float) * self.config.angle_scale_rad
+
+    def learn(self, trial: Trial) -> None:
+        """Back-propagation on the pairs of one trial, one step a pair, in the order they came."""
+        chosen = slice(-1, None) if self.config.pairs == 'last' else slice(None)
+        inputs = self._inputs(trial.face, trial.postures[chosen])
+        wanted = torch.from_numpy(
+            (trial.displacements()[chosen] / self.config.angle_scale_rad).astype(np.float32)
+        )
+        for one_input, one_wanted in zip(inputs, wanted, strict=True):
+            self._optimiser.zero_grad()
+            error = self._forward(one_input) - one_wanted
+            (0.5 * error.square().sum()).backward()
+            self._optimiser.step()
+        self.trials += 1
+        self.last_error_rad = float(error.detach().norm()) * self.config.angle_scale_rad
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Everything that learning has changed, as named arrays."""
+        arrays = {name: p.detach().numpy().copy() for name, p in self._parameters.items()}
+        for name, p in self._parameters.items():
+            momentum = self._optimiser.state[p].get('momentum_buffer')
+            if momentum is not None:
+                arrays[f'momentum_{name}'] = momentum.numpy().copy()
+        arrays['trials'] = np.array(self.trials)
+        return arrays
+
+    def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
+        """Take up the state of `state()`. Raises ValueError if it is another network's."""
+        for name, p in self._parameters.items():
+            if name not in arrays or arrays[name].shape != tuple(p.shape):
+                found = arrays[name].shape if name in arrays else 'nothing'
+                raise ValueError(f'{name} must have shape {tuple(p.shape)}, found {found}')
+        for name, p in self._parameters.items():
+            p.data.copy_(torch.from_numpy(arrays[name]))
+            momentum = arrays.get(f'momentum_{name}')
+            self._optimiser.state[p]['momentum_buffer'] = (
+                None if momentum is None else torch.from_numpy(momentum.copy())
+            )
+        self.trials = int(arrays['trials'])
+
+    def _forward(self, inputs: torch.Tensor) -> torch.Tensor:
+        p = self._parameters
+        hidden = torch.tanh(
+            torch.nn.functional.linear(inputs, p['hidden_weights'], p['hidden_biases'])
+        )
+        return torch.nn.functional.linear(hidden, p['output_weights'], p['output_biases'])
+
+    def _inputs(self, face: NDArray[Any], postures: NDArray[np.float64]) -> torch.Tensor:
+        pixels = np.broadcast_to(face.ravel() / 255.0 - 0.5, (len(postures), face.size))
+        return torch.from_numpy(
+            np.hstack([pixels, postures / self.config.angle_scale_rad]).astype(np.float32)
+        )

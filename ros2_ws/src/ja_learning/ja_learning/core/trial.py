@@ -1,0 +1,79 @@
+"""A trial as the learner lives it: a face, the postures visited, what was fixated in the end.
+
+Nobody announces a trial. It begins with a look at the caregiver and ends with the first fixation
+after it; a look without fixation before the next one leaves nothing to learn.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FACE_SHAPE = (30, 25)
+"""Rows and columns of the picture of the caregiver's face (Nagai et al. 2003, section 3.1)."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What one trial gives to learn from.
+
+    `face`: uint8 (30, 25). `postures`: (n, 2) [rad], where each shift began, the look at the
+    caregiver first. `fixation`: (2,) [rad], direction of the object fixated at the end.
+    """
+
+    face: NDArray[np.uint8]
+    postures: NDArray[np.float64]
+    fixation: NDArray[np.float64]
+
+    def displacements(self) -> NDArray[np.float64]:
+        """What remained to turn at each posture, shape (n, 2) [rad]: the target of learning."""
+        return self.fixation - self.postures
+
+
+class TrialRecorder:
+    """Cuts the stream of looks, postures at rest and fixations into trials."""
+
+    def __init__(self, same_within_rad: float = 0.02) -> None:
+        self._same_within = same_within_rad
+        self._face: NDArray[np.uint8] | None = None
+        self._postures: list[NDArray[np.float64]] = []
+
+    @property
+    def face(self) -> NDArray[np.uint8] | None:
+        """The face seen in the last look of the trial under way, or None between trials."""
+        return self._face
+
+    def look(self, face: ArrayLike, posture: ArrayLike) -> None:
+        """The head attends to the caregiver: a trial begins, or its look goes on."""
+        face = np.asarray(face)
+        if face.shape != FACE_SHAPE or face.dtype != np.uint8:
+            raise ValueError(
+                f'a face is uint8 of {FACE_SHAPE[0]} rows x {FACE_SHAPE[1]} columns, '
+                f'got {face.dtype} of shape {face.shape}'
+            )
+        self._face = face
+        self._postures = [np.array(posture, float)]
+
+    def rest(self, posture: ArrayLike) -> None:
+        """The head stands still at a posture (2,) [rad]; repeated postures count once."""
+        if self._face is not None and not self._same(posture, self._postures[-1]):
+            self._postures.append(np.array(posture, float))
+
+    def fixate(self, posture: ArrayLike, direction: ArrayLike) -> Trial | None:
+        """An object in this direction is fixated from this posture: the trial, if one was open."""
+        if self._face is None:
+            return None
+        began = self._postures
+        if len(began) > 1 and self._same(posture, began[-1]):
+            began = began[:-1]  # where the last shift ended, none began
+        trial = Trial(self._face, np.array(began), np.array(direction, float))
+        self.forget()
+        return trial
+
+    def forget(self) -> None:
+        """Drop the trial under way."""
+        self._face = None
+        self._postures = []
+
+    def _same(self, a: ArrayLike, b: ArrayLike) -> bool:
+        return bool(np.all(np.abs(np.subtract(a, b)) < self._same_within))

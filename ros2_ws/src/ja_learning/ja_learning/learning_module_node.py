@@ -1,0 +1,158 @@
+"""`learning_module`: proposes where to look from the caregiver's face, and learns it online."""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sensor_msgs.msg import Image, JointState, PointCloud2
+from std_msgs.msg import Header
+from std_srvs.srv import SetBool, Trigger
+
+from ja_common.core.config import parameter
+from ja_common.core.detection import caregiver_face
+from ja_common.core.posture import Posture
+from ja_common.core.stamp_join import StampJoin
+from ja_common.detection_codec import decode_detections
+from ja_common.graph_node import GraphNode, spin_node
+from ja_common.image_codec import decode_image
+from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.posture_listener import PostureListener
+from ja_common.time_codec import to_ns
+from ja_common.topics import DETECTIONS, FACE_IMAGE, FIXATION, LM_DELTA
+from ja_learning.core.checkpoint import load_checkpoint, save_checkpoint
+from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
+from ja_learning.core.trial import TrialRecorder
+
+
+@dataclass(frozen=True)
+class LearningModuleConfig:
+    """What the node needs beyond the learner itself."""
+
+    seed: int = parameter(0, 'seed of the initial weights', low=0)
+    learning_enabled_at_start: bool = parameter(True, 'learn from the start')
+    checkpoint_file: str = parameter('', 'where checkpoints are kept (.npz); empty: nowhere')
+    checkpoint_every_trials: int = parameter(
+        0, 'save after so many learned trials; 0: only when asked', low=0
+    )
+    still_below_rad_s: float = parameter(
+        0.05, 'a joint slower than this stands still', low=1e-4, high=5.0
+    )
+
+
+class LearningModuleNode(GraphNode):
+    """One proposal an image while a trial is under way; one lesson a fixation."""
+
+    def __init__(self, **node_kwargs: Any) -> None:
+        super().__init__('learning_module', **node_kwargs)
+        self._config = self.configure(LearningModuleConfig)
+        self._network_config = self.configure(NetworkConfig)
+        self._joints = JointCodec(self.configure(JointConfig))
+        self._learning = self._config.learning_enabled_at_start
+        self._learner = self._untaught()
+        self._trial = TrialRecorder()
+        self._postures = PostureListener(self, self._joints)
+        self._attended = StampJoin([FACE_IMAGE.name, DETECTIONS.name])
+        self.hear(FACE_IMAGE, self._on_face_image)
+        self.hear(DETECTIONS, self._on_detections, expected_every_s=2.0)
+        self.hear(FIXATION, self._on_fixation, expected_every_s=2.0)
+        self._delta = self.say(LM_DELTA)
+        self.offer(Trigger, 'save_checkpoint', self._on_save)
+        self.offer(Trigger, 'load_checkpoint', self._on_load)
+        self.offer(Trigger, 'reset_learning', self._on_reset)
+        self.offer(SetBool, 'learning_enabled', self._on_learning_enabled)
+
+    def _untaught(self) -> ThreeLayerNetwork:
+        return ThreeLayerNetwork(self._network_config, self._config.seed)
+
+    def _on_face_image(self, message: Image) -> None:
+        face = decode_image(message)[..., 0]
+        self._when_attended(FACE_IMAGE.name, message.header, face)
+
+    def _on_detections(self, message: PointCloud2) -> None:
+        face = caregiver_face(decode_detections(message))
+        if face is not None and face.attended:
+            self._when_attended(DETECTIONS.name, message.header, None)
+        else:
+            propose = partial(self._propose, message.header, None)
+            self._postures.when_known(to_ns(message.header.stamp), propose)
+
+    def _when_attended(self, key: str, header: Header, value: Any) -> None:
+        both = self._attended.add(key, to_ns(header.stamp), value)
+        if both is not None:
+            propose = partial(self._propose, header, both[FACE_IMAGE.name])
+            self._postures.when_known(to_ns(header.stamp), propose)
+
+    def _propose(self, header: Header, face: np.ndarray | None, posture: Posture) -> None:
+        if face is not None:
+            self._trial.look(face, posture.position)
+        elif posture.is_still(self._config.still_below_rad_s):
+            self._trial.rest(posture.position)
+        delta = None
+        if self._trial.face is not None:
+            delta = self._learner.predict(self._trial.face, posture.position)
+        self._delta.publish(self._joints.encode(header, delta))
+
+    def _on_fixation(self, message: JointState) -> None:
+        direction = self._joints.decode(message)
+        if direction is not None:
+            learn = partial(self._learn, direction)
+            self._postures.when_known(to_ns(message.header.stamp), learn)
+
+    def _learn(self, direction: np.ndarray, posture: Posture) -> None:
+        trial = self._trial.fixate(posture.position, direction)
+        if trial is None or not self._learning:
+            return
+        self._learner.learn(trial)
+        self.health.values['trials learned'] = str(self._learner.trials)
+        self.health.values['last error [rad]'] = f'{self._learner.last_error_rad:.3f}'
+        every = self._config.checkpoint_every_trials
+        if every and self._learner.trials % every == 0:
+            self._save()
+
+    def _checkpoint_file(self) -> Path:
+        if not self._config.checkpoint_file:
+            raise ValueError('the parameter checkpoint_file is empty: no place for checkpoints')
+        return Path(self._config.checkpoint_file).expanduser()
+
+    def _save(self) -> Path:
+        path = self._checkpoint_file()
+        save_checkpoint(path, self._learner.state(), {'learner': self._learner.kind})
+        return path
+
+    def _on_save(self, _: Trigger.Request, response: Trigger.Response) -> Any:
+        response.message = f'{self._learner.trials} trials saved to {self._save()}'
+        response.success = True
+        return response
+
+    def _on_load(self, _: Trigger.Request, response: Trigger.Response) -> Any:
+        path = self._checkpoint_file()
+        arrays, description = load_checkpoint(path)
+        if description.get('learner') != self._learner.kind:
+            raise ValueError(f'{path} is of a learner {description.get("learner")!r}')
+        self._learner.restore(arrays)
+        response.message = f'{self._learner.trials} trials loaded from {path}'
+        response.success = True
+        return response
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Any:
+        self._learner = self._untaught()
+        self._trial.forget()
+        response.success, response.message = True, 'everything learned is forgotten'
+        return response
+
+    def _on_learning_enabled(self, request: SetBool.Request, response: SetBool.Response) -> Any:
+        self._learning = request.data
+        response.success = True
+        response.message = 'learning' if request.data else 'not learning, still proposing'
+        return response
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    spin_node(LearningModuleNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,1 @@
+"""The simulated world seen through a camera, its scorer, and the digital pan-tilt head."""

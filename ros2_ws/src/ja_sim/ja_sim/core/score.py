@@ -1,0 +1,113 @@
+"""The score of joint attention: did the robot fixate the object that the caregiver meant?
+
+Only here and in the simulator is that known; the robot's own nodes never hear of it.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import binomtest
+
+from ja_common.core.geometry import angle_between
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How one trial ended. Directions are (pan, tilt) [rad]; no fixation means it was given up."""
+
+    trial: int
+    stamp_ns: int
+    objects: int
+    in_view: bool
+    attended: tuple[float, float]
+    fixated: tuple[float, float] | None
+    success: bool
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A share of successes among trials, with its 95 % interval (Wilson)."""
+
+    successes: int
+    trials: int
+
+    @property
+    def rate(self) -> float:
+        """Successes a trial; NaN before the first."""
+        return self.successes / self.trials if self.trials else float('nan')
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % confidence interval of the rate."""
+        if not self.trials:
+            return (0.0, 1.0)
+        found = binomtest(self.successes, self.trials).proportion_ci(method='wilson')
+        return (found.low, found.high)
+
+
+@dataclass(frozen=True)
+class TruthAt:
+    """The truth at one image: which trial it is and where the objects are.
+
+    `directions`: (n, 2) [rad] of the objects; `attended`: index of the one she means;
+    `in_view`: was it in the robot's view when the robot looked at her?
+    """
+
+    stamp_ns: int
+    trial: int
+    directions: np.ndarray
+    attended: int
+    in_view: bool
+
+
+class Score:
+    """Joins fixations with the truth; the first fixation of a trial decides."""
+
+    def __init__(self, window: int = 100) -> None:
+        self._truth: TruthAt | None = None
+        self._fixated: tuple[float, float] | None = None
+        self._success = False
+        self._recent: deque[bool] = deque(maxlen=window)
+        self._rates: dict[str, list[bool]] = {}
+
+    def see(self, truth: TruthAt, fixation: ArrayLike | None) -> Outcome | None:
+        """One image: the truth and the fixation (2,) [rad] at its stamp; what just ended, if any.
+
+        A trial ends when the next begins. What happens before the first look belongs to none.
+        """
+        ended = None
+        if self._truth is not None and truth.trial != self._truth.trial:
+            ended = self._close(self._truth)
+        self._truth = truth
+        if fixation is not None and self._fixated is None and truth.trial > 0:
+            nearest = int(np.argmin(angle_between(truth.directions, fixation)))
+            self._fixated = (float(fixation[0]), float(fixation[1]))  # type: ignore[index]
+            self._success = nearest == truth.attended
+        return ended
+
+    def rates(self) -> dict[str, Rate]:
+        """Rates by name: 'all', 'recent', 'in_view', 'out_of_view', and 'objects_N'."""
+        found = {name: Rate(sum(results), len(results)) for name, results in self._rates.items()}
+        return {'recent': Rate(sum(self._recent), len(self._recent)), **found}
+
+    def _close(self, truth: TruthAt) -> Outcome | None:
+        fixated, success = self._fixated, self._success
+        self._fixated, self._success = None, False
+        if truth.trial <= 0:
+            return None
+        outcome = Outcome(
+            truth.trial,
+            truth.stamp_ns,
+            len(truth.directions),
+            truth.in_view,
+            tuple(truth.directions[truth.attended].tolist()),
+            fixated,
+            success,
+        )
+        self._recent.append(success)
+        view = 'in_view' if truth.in_view else 'out_of_view'
+        for name in ('all', view, f'objects_{outcome.objects}'):
+            self._rates.setdefault(name, []).append(success)
+        return outcome

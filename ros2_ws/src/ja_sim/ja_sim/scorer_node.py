@@ -1,0 +1,113 @@
+"""`scorer`: joins the truth with what the robot fixated; no other node may hear the truth."""
+
+import csv
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Float32
+from std_srvs.srv import Trigger
+
+from ja_common.core.config import parameter
+from ja_common.core.stamp_join import StampJoin
+from ja_common.graph_node import GraphNode, spin_node
+from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.time_codec import to_ns
+from ja_common.topics import FIXATION, SCORE, SIM_TRUTH, SUCCESS_RATE
+from ja_sim.core.score import Outcome, Score
+from ja_sim.truth_codec import decode_truth
+
+
+@dataclass(frozen=True)
+class ScorerConfig:
+    """What is reported, and where it is kept."""
+
+    window_trials: int = parameter(100, 'trials of the recent success rate', low=1, high=100000)
+    csv_file: str = parameter('', 'file that gets one row a trial; empty: none')
+
+
+class ScorerNode(GraphNode):
+    """Success of joint attention, after every trial."""
+
+    def __init__(self, **node_kwargs: Any) -> None:
+        super().__init__('scorer', **node_kwargs)
+        self._config = self.configure(ScorerConfig)
+        self._joints = JointCodec(self.configure(JointConfig))
+        self._score = Score(self._config.window_trials)
+        self._join = StampJoin([SIM_TRUTH.name, FIXATION.name])
+        self.hear(SIM_TRUTH, self._on_truth, expected_every_s=2.0)
+        self.hear(FIXATION, self._on_fixation, expected_every_s=2.0)
+        self._success_rate = self.say(SUCCESS_RATE)
+        self._details = self.say(SCORE)
+        self.offer(Trigger, 'sim/reset_score', self._on_reset)
+        self._csv_file = self._open_csv(self._config.csv_file)
+
+    def destroy_node(self) -> None:
+        """Close the file, then the node."""
+        if self._csv_file is not None:
+            self._csv_file.close()
+        super().destroy_node()
+
+    def _open_csv(self, path: str) -> Any:
+        if not path:
+            return None
+        Path(path).expanduser().parent.mkdir(parents=True, exist_ok=True)
+        # Line-buffered: every finished trial is on disk at once. Closed by destroy_node.
+        file = open(Path(path).expanduser(), 'w', newline='', buffering=1)  # noqa: SIM115
+        self._csv = csv.DictWriter(file, [field.name for field in fields(Outcome)])
+        self._csv.writeheader()
+        return file
+
+    def _on_truth(self, message: PointCloud2) -> None:
+        self._collect(SIM_TRUTH.name, to_ns(message.header.stamp), decode_truth(message))
+
+    def _on_fixation(self, message: JointState) -> None:
+        self._collect(FIXATION.name, to_ns(message.header.stamp), self._joints.decode(message))
+
+    def _collect(self, key: str, stamp_ns: int, value: Any) -> None:
+        both = self._join.add(key, stamp_ns, value)
+        if both is None:
+            return
+        outcome = self._score.see(both[SIM_TRUTH.name], both[FIXATION.name])
+        if outcome is not None:
+            self._tell(outcome)
+
+    def _tell(self, outcome: Outcome) -> None:
+        if self._csv_file is not None:
+            self._csv.writerow(asdict(outcome))
+        rates = self._score.rates()
+        values = {}
+        for name, rate in rates.items():
+            low, high = rate.interval
+            values |= {
+                f'{name} trials': str(rate.trials),
+                f'{name} success_rate': f'{rate.rate:.4f}',
+                f'{name} interval': f'{low:.4f} {high:.4f}',
+            }
+        values['last'] = (
+            'success' if outcome.success else 'failure' if outcome.fixated else 'given up'
+        )
+        self._success_rate.publish(Float32(data=rates['recent'].rate))
+        self._details.publish(
+            DiagnosticStatus(
+                name=self.get_fully_qualified_name(),
+                message=f'{rates["all"].successes} of {rates["all"].trials} trials',
+                values=[KeyValue(key=key, value=value) for key, value in values.items()],
+            )
+        )
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Any:
+        self._score = Score(self._config.window_trials)
+        response.success, response.message = True, 'counting from nought'
+        return response
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    spin_node(ScorerNode, args)
+
+
+if __name__ == '__main__':
+    main()
