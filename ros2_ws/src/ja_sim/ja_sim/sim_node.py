@@ -136,7 +136,7 @@ class SimNode(GraphNode):
             joint_states.append(self._joints.encode(header, sample.position, sample.velocity))
         observation = self._world.observe()
         header = self._header(observation.stamp_ns, CAMERA_FRAME)
-        now = self._header(self._world.time_ns).stamp
+        now = self._header(self._world.now_ns).stamp
         return _Round(
             Clock(clock=now),
             encode_truth(header, self._world.truth()),
@@ -167,12 +167,12 @@ class SimNode(GraphNode):
 
 
 def _camera_info(header: Header, observation: Observation) -> CameraInfo:
-    height, width = observation.image.shape[:2]
-    fx, fy, cx, cy = observation.fx, observation.fy, observation.cx, observation.cy
+    lens = observation.intrinsics
+    fx, fy, cx, cy = lens.fx, lens.fy, lens.cx, lens.cy
     return CameraInfo(
         header=header,
-        width=width,
-        height=height,
+        width=lens.width,
+        height=lens.height,
         distortion_model='plumb_bob',
         d=[0.0] * 5,
         k=[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],

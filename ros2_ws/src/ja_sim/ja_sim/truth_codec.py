@@ -1,5 +1,9 @@
 """The simulator's truth on the wire: PointCloud2, one row an object."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
@@ -7,7 +11,9 @@ from std_msgs.msg import Header
 from ja_common.point_cloud_codec import decode_columns, encode_columns
 from ja_common.time_codec import to_ns
 from ja_sim.core.score import TruthAt
-from ja_sim.core.world import Truth
+
+if TYPE_CHECKING:  # the scorer reads this module and needs no MuJoCo
+    from ja_sim.core.world import Truth
 
 FIELDS = ('x', 'y', 'z', 'pan', 'tilt', 'attended', 'in_view', 'trial')
 
@@ -17,7 +23,7 @@ def encode_truth(header: Header, truth: Truth) -> PointCloud2:
     count = len(truth.positions)
     columns = [*truth.positions.T, *truth.directions.T]
     columns.append(np.arange(count) == truth.attended)
-    columns += [np.full(count, truth.in_view), np.full(count, truth.trial)]
+    columns += [np.full(count, truth.in_view_at_look), np.full(count, truth.trial)]
     return encode_columns(header, dict(zip(FIELDS, columns, strict=True)))
 
 
@@ -25,12 +31,12 @@ def decode_truth(message: PointCloud2) -> TruthAt:
     """What the scorer needs of it. Raises ValueError when the message is something else."""
     columns = decode_columns(message, FIELDS)
     attended = np.flatnonzero(columns['attended'])
-    if len(attended) != 1:
+    if len(attended) > 1 or not len(columns['trial']):
         raise ValueError(f'{len(attended)} objects are marked as attended; it must be one')
     return TruthAt(
         to_ns(message.header.stamp),
         int(columns['trial'][0]),
         np.column_stack([columns['pan'], columns['tilt']]).astype(float),
-        int(attended[0]),
+        int(attended[0]) if len(attended) else -1,
         bool(columns['in_view'][0]),
     )

@@ -51,7 +51,7 @@ class Rate:
 class TruthAt:
     """The truth at one image: which trial it is and where the objects are.
 
-    `directions`: (n, 2) [rad] of the objects; `attended`: index of the one she means;
+    `directions`: (n, 2) [rad] of the objects; `attended`: index of the one she means (-1: none);
     `in_view`: was it in the robot's view when the robot looked at her?
     """
 
@@ -102,7 +102,10 @@ class Score:
             truth.stamp_ns,
             len(truth.directions),
             truth.in_view,
-            tuple(truth.directions[truth.attended].tolist()),
+            (
+                float(truth.directions[truth.attended][0]),
+                float(truth.directions[truth.attended][1]),
+            ),
             fixated,
             success,
         )
