@@ -81,7 +81,7 @@ class SimNode(GraphNode):
         # The world's time starts at nought after a reset; the time of the graph never goes back.
         self._time_offset_ns = 0
         self.hear(JOINT_COMMANDS, self._on_command, expected_every_s=2.0)
-        self._clock = self.say(CLOCK)
+        self._simulated_time = self.say(CLOCK)
         self._truth = self.say(SIM_TRUTH)
         self._joint_states = self.say(JOINT_STATES)
         self._camera_info = self.say(CAMERA_INFO)
@@ -147,7 +147,7 @@ class SimNode(GraphNode):
 
     def _publish(self) -> None:
         self._published_s = time.monotonic()
-        self._clock.publish(self._round.clock)
+        self._simulated_time.publish(self._round.clock)
         self._truth.publish(self._round.truth)
         for message in self._round.joint_states:
             self._joint_states.publish(message)
