@@ -1,1 +1,1 @@
-"""What `./ja` needs before any package is installed: standard library only, Python 3.8 or newer."""
+"""What `./ja` needs before any package is installed: standard library only, Python 3.8 on."""

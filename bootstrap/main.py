@@ -12,18 +12,17 @@ from bootstrap.plan import BootstrapError
 from bootstrap.setup_environment import Environment
 
 
-def main(root: Path, args: Sequence[str]) -> int:
-    """Never returns when all is well: the process becomes the command."""
+def main(root: Path, args: Sequence[str]) -> None:
+    """Never returns: the process becomes the command, or ends with a sentence."""
     testing = list(args[:1]) == ['test']
     environment = Environment(root, os.environ)
     try:
         environment.prepare(dev=testing)
     except BootstrapError as error:
-        print(f'ja: {error}', file=sys.stderr)
-        return 1
+        sys.exit(f'ja: {error}')
     except KeyboardInterrupt:
-        print('ja: set-up interrupted; the next run goes on from here', file=sys.stderr)
-        return 130
+        print('\nja: set-up interrupted; the next run goes on from here', file=sys.stderr)
+        sys.exit(130)
     if testing:
         os.chdir(root)
         command = ['-m', 'pytest', *args[1:]]

@@ -6,7 +6,7 @@ DATA = ('yaml', 'xml', 'obj', 'png', 'jpg', 'npz', 'tflite', 'caffemodel', 'prot
 setup(
     name=PACKAGE,
     version='0.1.0',
-    description='What several packages of Joint Attention need: topic names, QoS, codecs, postures.',
+    description='What several packages need: topic names, QoS, codecs, postures.',
     license='Apache-2.0',
     maintainer='The Joint Attention team',
     maintainer_email='joint-attention@example.org',

@@ -6,7 +6,7 @@ DATA = ('yaml', 'xml', 'obj', 'png', 'jpg', 'npz', 'tflite', 'caffemodel', 'prot
 setup(
     name=PACKAGE,
     version='0.1.0',
-    description='The simulated world seen through a camera, its scorer, and the digital pan-tilt head.',
+    description='The simulated world seen through a camera, its scorer, the digital head.',
     license='Apache-2.0',
     maintainer='The Joint Attention team',
     maintainer_email='joint-attention@example.org',

@@ -1,0 +1,102 @@
+"""`./ja COMMAND`: the commands of the system."""
+
+import sys
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ja_bringup.graph import rig_graph, sim_graph, split_ros_arguments, with_arguments
+from ja_common.ros_defaults import apply_ros_defaults
+
+app = typer.Typer(
+    help='A camera head that learns joint attention, on ROS 2. ROS arguments go behind '
+    '`--ros-args`, as for any node: -r, -p, --params-file, __ns.',
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+class OnDeathChoice(str, Enum):
+    """What happens when a node dies."""
+
+    stop = 'stop'
+    restart = 'restart'
+
+
+OnDeathOption = Annotated[OnDeathChoice, typer.Option(help='What to do when a node dies.')]
+OneProcess = Annotated[bool, typer.Option('--one-process', help='All nodes in one process.')]
+TimeOption = Annotated[float, typer.Option('--time', min=0.0, help='End after so many seconds.')]
+
+
+@app.command()
+def demo(
+    context: typer.Context,
+    trials: Annotated[int, typer.Option(min=1, help='End after so many trials.')] = 1500,
+    time_s: TimeOption = 150.0,
+    seed: Annotated[int, typer.Option(min=0, help='Seed of the world and of the robot.')] = 0,
+    scene: Annotated[str, typer.Option(help='Scene of the sim, by name or file.')] = 'easy',
+    one_process: OneProcess = False,
+    on_death: OnDeathOption = OnDeathChoice.stop,
+) -> None:
+    """Watch the simulated head learn to follow the caregiver's gaze."""
+    from ja_bringup.demo import run_demo
+
+    graph = with_arguments(sim_graph(seed, {'scene': scene}), context.obj or [])
+    sys.exit(run_demo(graph, trials, time_s, one_process, on_death.value, context.obj or []))
+
+
+@app.command()
+def rig(
+    context: typer.Context,
+    source: Annotated[
+        str | None,
+        typer.Option(
+            help='Webcam device, video file or image folder, in which a digital head looks '
+            "around. Without it, the rig's own drivers are heard."
+        ),
+    ] = None,
+    time_s: TimeOption = 0.0,
+    one_process: OneProcess = False,
+    on_death: OnDeathOption = OnDeathChoice.stop,
+) -> None:
+    """Run the same graph on real pictures: a digital head in them, or a rig's own motors."""
+    from ja_bringup.run import new_run_folder, run_graph
+
+    arguments = context.obj or []
+    code, _ = run_graph(
+        with_arguments(rig_graph(source), arguments),
+        new_run_folder('rig'),
+        'Joint attention, on real pictures',
+        lambda node: 0.0 < time_s < node.elapsed_s,
+        one_process=one_process,
+        on_death=on_death.value,
+        arguments=arguments,
+    )
+    sys.exit(code)
+
+
+@app.command()
+def bench(
+    name: Annotated[str | None, typer.Argument(help='Which one; all of them without it.')] = None,
+    json_file: Annotated[
+        Path | None, typer.Option('--json', help='Write the figures to this file.')
+    ] = None,
+) -> None:
+    """Measure: a table of figures, each with its unit, count and interval."""
+    from ja_bringup.bench import run_benchmarks
+
+    sys.exit(run_benchmarks(name, json_file))
+
+
+def main() -> None:
+    """Split ROS's arguments off, as rclpy does, and run the command."""
+    apply_ros_defaults()
+    ours, ros = split_ros_arguments(sys.argv[1:])
+    app(args=ours, obj=ros, prog_name='ja')
+
+
+if __name__ == '__main__':
+    main()

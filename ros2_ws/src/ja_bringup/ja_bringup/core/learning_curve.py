@@ -1,0 +1,41 @@
+"""The success curve of a run: what came of every trial, and how sure the rates are."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ja_sim.core.score import Rate
+
+
+@dataclass(frozen=True)
+class TrialRecord:
+    """One scored trial. `p_lm`: probability, 0-1, that its shifts followed the learner."""
+
+    trial: int
+    success: bool
+    p_lm: float
+    elapsed_s: float
+
+
+class LearningCurve:
+    """Trials in the order they ended."""
+
+    def __init__(self) -> None:
+        self.records: list[TrialRecord] = []
+
+    def add(self, success: bool, p_lm: float, elapsed_s: float) -> None:
+        """The next trial has ended."""
+        self.records.append(TrialRecord(len(self.records) + 1, success, p_lm, elapsed_s))
+
+    def rate(self, trials: slice = slice(None)) -> Rate:
+        """Success rate among some of the trials."""
+        chosen = self.records[trials]
+        return Rate(sum(record.success for record in chosen), len(chosen))
+
+    def recent_rates(self, window: int) -> NDArray[np.float64]:
+        """Success rate over the last `window` trials after every trial, shape (n,)."""
+        successes = np.cumsum([0, *(record.success for record in self.records)])
+        trials = np.arange(1, len(successes))
+        first = np.maximum(trials - window, 0)
+        return (successes[trials] - successes[first]) / (trials - first)

@@ -1,0 +1,127 @@
+"""A graph as data: which nodes, with which parameters and remappings."""
+
+import importlib
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+CONFIG = Path(str(files('ja_bringup'))) / 'config'
+
+
+@dataclass(frozen=True)
+class NodeSpec:
+    """One node, as its own process or as one of many in a process.
+
+    `thing` is the file's name without `_node`, the executable's and, unless remapped, the node's.
+    `arguments` are ROS arguments for every node of the graph (`-r`, `-p`, `--params-file`); they
+    stand last, so that they win. `environ` is added to the process's environment.
+    """
+
+    package: str
+    thing: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    remappings: Mapping[str, str] = field(default_factory=dict)
+    params_files: Sequence[Path] = ()
+    arguments: Sequence[str] = ()
+    environ: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def module(self) -> str:
+        return f'{self.package}.{self.thing}_node'
+
+    @property
+    def class_name(self) -> str:
+        return ''.join(word.capitalize() for word in self.thing.split('_')) + 'Node'
+
+    def ros_arguments(self) -> list[str]:
+        """The node's arguments, from `--ros-args` on."""
+        arguments = ['--ros-args']
+        for path in self.params_files:
+            arguments += ['--params-file', str(path)]
+        for name, value in self.parameters.items():
+            # YAML's flow style is what rcl reads after `:=`.
+            text = yaml.safe_dump(value, default_flow_style=True, width=10**6)
+            arguments += ['-p', f'{name}:={text.removesuffix("...").strip()}']
+        for old, new in self.remappings.items():
+            arguments += ['-r', f'{old}:={new}']
+        return [*arguments, *self.arguments]
+
+    def command(self) -> list[str]:
+        """The command line of the node's own process; it ends with the process that starts it."""
+        return [sys.executable, '-m', 'ja_bringup.child', self.module, *self.ros_arguments()]
+
+    def load(self) -> type:
+        """The node's class, for the composition in one process."""
+        return getattr(importlib.import_module(self.module), self.class_name)
+
+
+def split_ros_arguments(argv: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Command line -> (ours, ROS's without `--ros-args`); ROS's end at `--` or at the end."""
+    ours: list[str] = []
+    ros: list[str] = []
+    in_ros = False
+    for argument in argv:
+        if argument == '--ros-args':
+            in_ros = True
+        elif in_ros and argument == '--':
+            in_ros = False
+        else:
+            (ros if in_ros else ours).append(argument)
+    return ours, ros
+
+
+def with_arguments(graph: Sequence[NodeSpec], arguments: Sequence[str]) -> list[NodeSpec]:
+    """The graph with further ROS arguments for every node."""
+    return [replace(node, arguments=[*node.arguments, *arguments]) for node in graph]
+
+
+def sim_graph(seed: int = 0, sim_parameters: Mapping[str, Any] | None = None) -> list[NodeSpec]:
+    """The mind before the simulated head. The seed is everybody's, so that a run repeats."""
+    params_file = CONFIG / 'demo.yaml'
+    world = [
+        NodeSpec('ja_sim', 'scorer', params_files=[params_file]),
+        NodeSpec(
+            'ja_sim',
+            'sim',
+            params_files=[params_file],
+            parameters={'seed': seed, **(sim_parameters or {})},
+        ),
+    ]
+    return [*_mind(params_file, seed), *world]
+
+
+def rig_graph(source: str | None = None, seed: int = 0) -> list[NodeSpec]:
+    """The mind before a real picture.
+
+    With a source (webcam, video file, image folder) a digital pan-tilt head moves its window in
+    that picture. Without one, the rig's own drivers publish `image_raw` and `joint_states`, and
+    obey `joint_commands`.
+    """
+    params_file = CONFIG / 'rig.yaml'
+    mind = _mind(params_file, seed)
+    if source is None:
+        return mind
+    camera = NodeSpec(
+        'ja_perception',
+        'camera',
+        params_files=[params_file],
+        parameters={'source': source},
+        remappings={'image_raw': 'wide/image_raw', 'camera_info': 'wide/camera_info'},
+    )
+    return [*mind, NodeSpec('ja_sim', 'digital_head', params_files=[params_file]), camera]
+
+
+def _mind(params_file: Path, seed: int) -> list[NodeSpec]:
+    """What looks, learns and moves, whatever the head and the camera are."""
+    return [
+        NodeSpec('ja_perception', 'salient_feature_detector', params_files=[params_file]),
+        NodeSpec('ja_control', 'visual_feedback_controller', params_files=[params_file]),
+        NodeSpec('ja_learning', 'internal_evaluator', params_files=[params_file]),
+        NodeSpec('ja_learning', 'learning_module', {'seed': seed}, params_files=[params_file]),
+        NodeSpec('ja_control', 'gate', {'seed': seed}, params_files=[params_file]),
+    ]

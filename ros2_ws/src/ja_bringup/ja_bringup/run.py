@@ -1,0 +1,85 @@
+"""Run a graph in either composition, with its progress on the terminal."""
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+
+from ja_bringup.graph import NodeSpec
+from ja_bringup.one_process import run_in_one_process
+from ja_bringup.progress import Display, ProgressNode
+from ja_bringup.supervisor import OnDeath, Supervisor
+from ja_common.ros_defaults import apply_ros_defaults
+
+
+def new_run_folder(name: str, parent: Path = Path('runs')) -> Path:
+    """`runs/<time>-<name>`, made."""
+    folder = parent / f'{time.strftime("%Y%m%d-%H%M%S")}-{name}'
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def run_graph(
+    graph: Sequence[NodeSpec],
+    folder: Path,
+    title: str,
+    done: Callable[[ProgressNode], bool],
+    *,
+    one_process: bool = False,
+    on_death: OnDeath = 'stop',
+    arguments: Sequence[str] = (),
+) -> tuple[int, ProgressNode]:
+    """Run until `done`, a signal, or a death; the exit code, and the node that has watched.
+
+    `arguments`: the ROS arguments that all nodes get (a namespace is the watcher's as well).
+    """
+    apply_ros_defaults()
+    watcher: list[ProgressNode] = []
+
+    def make_watcher(context: Context) -> ProgressNode:
+        cli = ['--ros-args', *arguments] if arguments else []
+        watcher.append(
+            ProgressNode(context=context, cli_args=cli, use_global_arguments=False)
+        )
+        return watcher[0]
+
+    with Display(title) as display:
+
+        def is_done() -> bool:
+            display.show(watcher[0])
+            return done(watcher[0])
+
+        if one_process:
+            code = run_in_one_process(graph, make_watcher, is_done, display.say)
+        else:
+            code = _run_processes(graph, folder, make_watcher, is_done, on_death, display.say)
+    return code, watcher[0]
+
+
+def _run_processes(
+    graph: Sequence[NodeSpec],
+    folder: Path,
+    make_watcher: Callable[[Context], ProgressNode],
+    is_done: Callable[[], bool],
+    on_death: OnDeath,
+    say: Callable[[str], None],
+) -> int:
+    context = Context()
+    rclpy.init(args=[], context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
+    executor = SingleThreadedExecutor(context=context)
+    node = make_watcher(context)
+    executor.add_node(node)
+
+    def tick() -> bool:
+        executor.spin_once(timeout_sec=0.1)
+        return is_done()
+
+    try:
+        return Supervisor(graph, folder / 'log', on_death, say).run(tick)
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+        context.try_shutdown()
