@@ -1,0 +1,93 @@
+"""A graph as data, and its command lines."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+from rclpy.context import Context
+from rclpy.node import Node
+
+from ja_bringup.graph import (
+    CONFIG,
+    NodeSpec,
+    rig_graph,
+    sim_graph,
+    split_ros_arguments,
+    with_arguments,
+)
+
+
+def test_names_follow_from_the_thing():
+    spec = NodeSpec('ja_control', 'visual_feedback_controller')
+    assert spec.module == 'ja_control.visual_feedback_controller_node'
+    assert spec.class_name == 'VisualFeedbackControllerNode'
+
+
+@pytest.mark.parametrize('value', [True, 3, 2.5, 1e-7, 'word', '12', '', 'a: b', [1.0, 2.0]])
+def test_parameters_arrive_as_they_were_meant(value, ros_context):
+    spec = NodeSpec('p', 't', parameters={'value': value})
+    node = Node('t', context=ros_context, cli_args=spec.ros_arguments())
+    received = node.declare_parameter('value', value).value
+    node.destroy_node()
+    assert (list(received) if isinstance(value, list) else received) == value
+
+
+def test_arguments_of_the_user_stand_last_so_that_they_win(ros_context: Context, tmp_path: Path):
+    params_file = tmp_path / 'params.yaml'
+    params_file.write_text('/**:\n  ros__parameters:\n    a: 1\n    b: 1\n    c: 1\n')
+    mine = tmp_path / 'mine.yaml'
+    mine.write_text('/**:\n  ros__parameters:\n    b: 3\n')
+    spec = NodeSpec('p', 't', {'c': 2}, {'chatter': 'talk'}, [params_file])
+    user = ['--params-file', str(mine), '-p', 'c:=3', '-r', '__ns:=/robot']
+    [spec] = with_arguments([spec], user)
+    node = Node('t', context=ros_context, cli_args=spec.ros_arguments())
+    values = [node.declare_parameter(name, 0).value for name in 'abc']
+    namespace, topic = node.get_namespace(), node.resolve_topic_name('chatter')
+    node.destroy_node()
+    assert values == [1, 3, 3]
+    assert (namespace, topic) == ('/robot', '/robot/talk')
+
+
+@pytest.mark.parametrize(
+    ('argv', 'ours', 'ros'),
+    [
+        ([], [], []),
+        (['demo', '--trials', '3'], ['demo', '--trials', '3'], []),
+        (['demo', '--ros-args', '-r', 'a:=b'], ['demo'], ['-r', 'a:=b']),
+        (['demo', '--ros-args', '-r', 'a:=b', '--', '--seed', '1'],
+         ['demo', '--seed', '1'], ['-r', 'a:=b']),
+    ],
+)  # fmt: skip
+def test_ros_arguments_are_split_off(argv, ours, ros):
+    assert split_ros_arguments(argv) == (ours, ros)
+
+
+GRAPHS = {'sim': sim_graph(seed=3), 'rig': rig_graph('clip.mp4'), 'bare rig': rig_graph()}
+
+
+@pytest.mark.parametrize('graph', GRAPHS.values(), ids=GRAPHS.keys())
+def test_every_node_of_a_graph_is_there(graph):
+    for spec in graph:
+        assert issubclass(spec.load(), Node)
+
+
+def test_only_the_sim_graph_has_a_truth_to_score():
+    assert {'sim', 'scorer'} <= {spec.thing for spec in GRAPHS['sim']}
+    for name in ('rig', 'bare rig'):
+        assert not {'sim', 'scorer'} & {spec.thing for spec in GRAPHS[name]}
+    assert 'camera' not in {spec.thing for spec in GRAPHS['bare rig']}
+
+
+@pytest.mark.parametrize('path', sorted(CONFIG.glob('*.yaml')), ids=lambda path: path.name)
+def test_every_configured_parameter_exists_in_the_node_it_is_for(path, ros_context):
+    graph = {spec.thing: spec for graph in GRAPHS.values() for spec in graph}
+    sections = yaml.safe_load(path.read_text())
+    for section, content in sections.items():
+        thing = section.rsplit('/', 1)[-1]
+        if thing == '**':
+            continue
+        spec = graph[thing]
+        node = spec.load()(context=ros_context, cli_args=spec.ros_arguments())
+        unknown = [name for name in content['ros__parameters'] if not node.has_parameter(name)]
+        node.destroy_node()
+        assert not unknown, f'{path.name}, {section}: no such parameter'
