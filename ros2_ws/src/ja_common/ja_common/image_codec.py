@@ -6,7 +6,8 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 from builtin_interfaces.msg import Time
-from sensor_msgs.msg import CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import Header
 
 
 class ImageError(ValueError):
@@ -136,6 +137,17 @@ def encode_image(pixels: np.ndarray, stamp: Time, frame_id: str) -> Image:
     msg.step = msg.width * (3 if colour else 1)
     # Assigning an array.array is taken over whole; an ndarray would be copied element by element.
     data = array.array('B')
-    data.frombytes(memoryview(np.ascontiguousarray(pixels)).cast('B'))
+    data.frombytes(np.ascontiguousarray(pixels).data.cast('B'))
     msg.data = data
     return msg
+
+
+def encode_camera_info(header: Header, width: int, height: int, focal_px: float) -> CameraInfo:
+    """Calibration of an ideal camera: square pixels, axis through the centre, no distortion."""
+    cx, cy = (width - 1) / 2, (height - 1) / 2
+    info = CameraInfo(header=header, width=width, height=height)
+    info.distortion_model, info.d = 'plumb_bob', [0.0] * 5
+    info.k = [focal_px, 0.0, cx, 0.0, focal_px, cy, 0.0, 0.0, 1.0]
+    info.r = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+    info.p = [focal_px, 0.0, cx, 0.0, 0.0, focal_px, cy, 0.0, 0.0, 0.0, 1.0, 0.0]
+    return info

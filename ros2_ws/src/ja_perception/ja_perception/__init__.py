@@ -1,0 +1,1 @@
+"""Salient features, faces and cameras: from image_raw to detections."""

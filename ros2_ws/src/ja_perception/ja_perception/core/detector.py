@@ -1,0 +1,149 @@
+"""The salient feature detector of Nagai, Hosoda and Asada (2003): one image in, detections out."""
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ja_common.core.config import parameter
+from ja_common.core.detection import Detection, Kind, most_salient
+from ja_common.core.fixation import WIDTH_SIXTH, stands_in_centre
+from ja_common.core.posture import Posture
+from ja_perception.core.box import Box
+from ja_perception.core.camera_model import CameraModel
+from ja_perception.core.face_crop import FACE_COLUMNS, FACE_ROWS, crop_face
+from ja_perception.core.face_watch import FaceConfig, FaceWatch
+from ja_perception.core.faces import FaceFinder
+from ja_perception.core.features import FeatureConfig
+from ja_perception.core.grouping import GroupingConfig
+from ja_perception.core.object_tracking import TrackingConfig
+from ja_perception.core.salient_objects import InterestConfig, SalientObject, SalientObjects
+
+
+@dataclass(frozen=True)
+class AttentionConfig:
+    """When the face counts as attended, and how it is cut out for the learner."""
+
+    d_th_rad: float = parameter(
+        WIDTH_SIXTH, 'd_th of Eq. 3: how near to the centre a thing is attended to',
+        low=0.0, high=1.0,
+    )  # fmt: skip
+    still_below_rad_s: float = parameter(
+        0.02, 'the head is still when both joints are slower', low=0.0, high=10.0
+    )
+    crop_widths: float = parameter(
+        1.3, 'width of the face image (in widths of the face)', low=0.5, high=5.0
+    )
+
+
+@dataclass(frozen=True)
+class DetectorConfig:
+    """All that can be tuned."""
+
+    attention: AttentionConfig = field(default_factory=AttentionConfig)
+    interest: InterestConfig = field(default_factory=InterestConfig)
+    features: FeatureConfig = field(default_factory=FeatureConfig)
+    grouping: GroupingConfig = field(default_factory=GroupingConfig)
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)
+    faces: FaceConfig = field(default_factory=FaceConfig)
+
+
+@dataclass(frozen=True)
+class Percept:
+    """What one image holds.
+
+    ``detections``: the caregiver's face first, other faces, then objects, most salient first.
+    ``face_image``: (30, 25) uint8 while the head attends to the caregiver, cut from
+    ``face_image_box`` [px]; else both are None. ``motion_judged``: False where motion could not be
+    told (first image, head too fast).
+    """
+
+    detections: list[Detection]
+    face_image: NDArray[np.uint8] | None
+    face_image_box: Box | None
+    motion_judged: bool
+
+    @property
+    def target(self) -> Detection | None:
+        """The object i_trg of Eq. 1."""
+        return most_salient(self.detections)
+
+
+class SalientFeatureDetector:
+    """Finds faces and salient objects in image after image."""
+
+    def __init__(self, finder: FaceFinder, config: DetectorConfig | None = None) -> None:
+        config = config or DetectorConfig()
+        self._attention = config.attention
+        self._objects = SalientObjects(
+            config.interest, config.features, config.grouping, config.tracking
+        )
+        self._faces = FaceWatch(finder, config.faces)
+
+    def look(
+        self,
+        image: NDArray[np.uint8],
+        stamp_ns: int,
+        camera: CameraModel,
+        posture: Posture | None,
+    ) -> Percept:
+        """What is seen in an (H, W, 3) uint8 RGB image.
+
+        ``posture`` is the head's at the image's stamp. Without one (None) the camera is taken to
+        stand still in the base frame, and no face counts as attended: whether the head is still is
+        then not known.
+        """
+        position = np.zeros(2) if posture is None else posture.position
+        faces = self._faces.look(image, camera, position, stamp_ns)
+        boxes = [face.box(camera, position) for face in faces]
+        objects = self._objects.find(
+            image, stamp_ns, camera, posture, [_whole_head(box) for box in boxes]
+        )
+        attended = bool(faces) and self._attends(faces[0].ray(position), posture)
+        crop_box = self._crop_box(boxes[0]) if attended else None
+        face_image = None
+        if crop_box is not None:
+            face_image = crop_face(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), crop_box)
+        face_rows = [
+            _row(Kind.FACE, box, camera, face.score, face.track_id, attended and index == 0)
+            for index, (face, box) in enumerate(zip(faces, boxes, strict=True))
+        ]
+        object_rows = [_object_row(item, camera) for item in objects]
+        return Percept(face_rows + object_rows, face_image, crop_box, self._objects.motion_judged)
+
+    def _attends(self, ray: NDArray[np.float64], posture: Posture | None) -> bool:
+        """Does the head rest with the ray (x, y) in the centre (Eq. 3)?"""
+        if posture is None or not posture.is_still(self._attention.still_below_rad_s):
+            return False
+        return stands_in_centre(ray, self._attention.d_th_rad)
+
+    def _crop_box(self, face: Box) -> Box:
+        width = self._attention.crop_widths * face.width
+        return Box(face.u, face.v, width, width * FACE_ROWS / FACE_COLUMNS)
+
+
+def _whole_head(face: Box) -> Box:
+    """The head with hair, ears and neck around the box of a face."""
+    return Box(face.u, face.v, 1.5 * face.width, 1.8 * face.height)
+
+
+def _row(
+    kind: Kind,
+    box: Box,
+    camera: CameraModel,
+    score: float,
+    track_id: int,
+    attended: bool = False,
+    features: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Detection:
+    x, y = camera.rays((box.u, box.v))
+    return Detection(
+        kind, float(x), float(y), box.u, box.v, box.width, box.height, score, track_id, *features,
+        attended=attended,
+    )  # fmt: skip
+
+
+def _object_row(item: SalientObject, camera: CameraModel) -> Detection:
+    features = (item.f_col, item.f_edg, item.f_mot)
+    return _row(Kind.OBJECT, item.box, camera, item.score, item.track_id, features=features)

@@ -1,0 +1,53 @@
+"""echo_detections: prints detections as a table."""
+
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from sensor_msgs.msg import PointCloud2
+
+from ja_common.core.detection import Detection
+from ja_common.detection_codec import decode_detections
+from ja_common.graph_node import GraphNode, spin_node
+from ja_common.time_codec import to_ns
+from ja_common.topics import DETECTIONS
+
+_HEAD = '  kind     id       u       v   width  height  score  f_col  f_edg  f_mot  attended'
+
+
+class EchoDetectionsNode(GraphNode):
+    """Prints every detections message to the standard output."""
+
+    def __init__(self, **node_kwargs: Any) -> None:
+        super().__init__('echo_detections', **node_kwargs)
+        self.hear(DETECTIONS, self._on_detections, expected_every_s=2.0)
+
+    def _on_detections(self, message: PointCloud2) -> None:
+        print(table(to_ns(message.header.stamp), decode_detections(message)), flush=True)
+
+
+def table(stamp_ns: int, detections: list[Detection]) -> str:
+    """The detections of one image as text."""
+    title = f'{stamp_ns / 1e9:.3f} s: {len(detections)} seen'
+    return '\n'.join([title, *([_HEAD] if detections else []), *map(_line, detections)])
+
+
+def _line(d: Detection) -> str:
+    return (
+        f'  {d.kind.name.lower():<7}{d.track_id:>4}{d.u:>8.1f}{d.v:>8.1f}{d.width:>8.1f}'
+        f'{d.height:>8.1f}{d.score:>7.2f}{d.f_col:>7.2f}{d.f_edg:>7.2f}{d.f_mot:>7.2f}'
+        f'  {"yes" if d.attended else ""}'
+    ).rstrip()
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    try:
+        spin_node(EchoDetectionsNode, args)
+    except BrokenPipeError:
+        # The reader (`| head`) has seen enough.
+        sys.stderr.close()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,201 @@
+"""salient_feature_detector: image in, faces and salient objects out (Eq. 1), stamp unchanged."""
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import Field, dataclass, fields, replace
+from typing import Any
+
+import cv2
+import numpy as np
+from geometry_msgs.msg import Point, PointStamped
+from numpy.typing import NDArray
+from rclpy.clock import Clock, ClockType
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
+from std_msgs.msg import Header
+
+from ja_common.core.config import parameter
+from ja_common.core.detection import Detection, caregiver_face
+from ja_common.core.health import Level
+from ja_common.core.posture import Posture, PostureHistory
+from ja_common.detection_codec import encode_detections
+from ja_common.graph_node import GraphNode, spin_node
+from ja_common.image_codec import decode_compressed, decode_image, encode_image
+from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.time_codec import to_ns
+from ja_common.topics import (
+    CAMERA_INFO,
+    DETECTIONS,
+    FACE,
+    FACE_IMAGE,
+    IMAGE,
+    IMAGE_ANNOTATED,
+    IMAGE_COMPRESSED,
+    JOINT_STATES,
+    TARGET,
+)
+from ja_perception.core.annotate import annotated
+from ja_perception.core.blazeface import BlazeFace
+from ja_perception.core.camera_model import CameraModel
+from ja_perception.core.detector import DetectorConfig, Percept, SalientFeatureDetector
+from ja_perception.core.waiting_images import WaitingImages
+
+
+@dataclass(frozen=True)
+class InputConfig:
+    """What the node hears, and how long it waits for it."""
+
+    compressed: bool = parameter(False, 'hear image_raw/compressed instead of image_raw')
+    field_of_view_rad: float = parameter(
+        math.radians(36), 'horizontal view of a camera that sends no calibration',
+        low=0.01, high=3.0,
+    )  # fmt: skip
+    silent_after_s: float = parameter(2.0, 'time without images after which to warn', low=0.1)
+    posture_wait_s: float = parameter(
+        1.0, 'longest time that an image waits for the posture at its stamp', low=0.0, high=60.0
+    )
+
+
+class SalientFeatureDetectorNode(GraphNode):
+    """One detections message for every image, also when nothing is seen."""
+
+    def __init__(self, **node_kwargs: Any) -> None:
+        super().__init__('salient_feature_detector', **node_kwargs)
+        # One image at a time on one core: threads only wait for each other at these sizes.
+        cv2.setNumThreads(1)
+        self._input = self.configure(InputConfig)
+        self._joints = JointCodec(self.configure(JointConfig))
+        self._finder = BlazeFace()
+        self._config = DetectorConfig(
+            **{part.name: self._tunable(part) for part in fields(DetectorConfig)}
+        )
+        self._detector = SalientFeatureDetector(self._finder, self._config)
+        self._calibration: CameraInfo | None = None
+        self._postures = PostureHistory()
+        self._images: WaitingImages[Image | CompressedImage] = WaitingImages(
+            self._postures, self._input.posture_wait_s
+        )
+
+        self._says_detections = self.say(DETECTIONS)
+        self._says_target = self.say(TARGET)
+        self._says_face = self.say(FACE)
+        self._says_face_image = self.say(FACE_IMAGE)
+        self._says_annotated = self.say(IMAGE_ANNOTATED)
+        image_topic = IMAGE_COMPRESSED if self._input.compressed else IMAGE
+        silent_after_s = self._input.silent_after_s
+        self.hear(CAMERA_INFO, self._on_camera_info, silent_after_s)
+        self.hear(JOINT_STATES, self._on_joint_states, silent_after_s)
+        self.hear(image_topic, self._on_image, silent_after_s)
+        # Wall time: it is for the case that the other messages do not come.
+        self.create_timer(0.1, self._see_ready, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _tunable(self, part: Field) -> Any:
+        """A part of the configuration that may change; the detector then starts anew."""
+
+        def changed(config: Any) -> None:
+            self._config = replace(self._config, **{part.name: config})
+            self._detector = SalientFeatureDetector(self._finder, self._config)
+
+        return self.configure(part.default_factory, changed)  # type: ignore[arg-type]
+
+    def _on_camera_info(self, message: CameraInfo) -> None:
+        CameraModel.from_calibration(message.width, message.height, message.k, message.d)
+        self._calibration = message
+        self._see_ready()
+
+    def _on_joint_states(self, message: JointState) -> None:
+        position = self._joints.decode(message)
+        if position is None:
+            raise ValueError('the message names no joints')
+        velocity = self._joints.decode_velocity(message)
+        self._postures.add(to_ns(message.header.stamp), position, velocity)
+        self._see_ready()
+
+    def _on_image(self, message: Image | CompressedImage) -> None:
+        self._images.add(to_ns(message.header.stamp), message, time.monotonic())
+        self._see_ready()
+
+    def _see_ready(self) -> None:
+        calibrated = self._calibration is not None
+        for message, stamp_ns, posture in self._images.ready(calibrated, time.monotonic()):
+            if posture is None:
+                self.problem(
+                    'posture',
+                    'no joint state for the stamp of the image: the camera is taken to stand '
+                    'still, and no face counts as attended',
+                    Level.WARN,
+                )
+            self._see(message, stamp_ns, posture)
+
+    def _see(
+        self, message: Image | CompressedImage, stamp_ns: int, posture: Posture | None
+    ) -> None:
+        start = time.perf_counter()
+        compressed = isinstance(message, CompressedImage)
+        image = decode_compressed(message) if compressed else decode_image(message)
+        camera = self._camera(image)
+        percept = self._detector.look(image, stamp_ns, camera, posture)
+        self._tell(message.header, percept)
+        seconds = time.perf_counter() - start
+        self.health.values['time an image [ms]'] = f'{1000 * seconds:.2f}'
+        if self._says_annotated.get_subscription_count():
+            self._draw(message.header, image, percept, camera, seconds)
+
+    def _tell(self, header: Header, percept: Percept) -> None:
+        # The face image goes first: whoever reads `attended` may count on it.
+        if percept.face_image is not None:
+            self._says_face_image.publish(
+                encode_image(percept.face_image, header.stamp, header.frame_id)
+            )
+        self._says_detections.publish(encode_detections(header, percept.detections))
+        for publisher, detection in (
+            (self._says_target, percept.target),
+            (self._says_face, caregiver_face(percept.detections)),
+        ):
+            if detection is not None:
+                publisher.publish(_point(header, detection))
+
+    def _draw(
+        self,
+        header: Header,
+        image: NDArray[np.uint8],
+        percept: Percept,
+        camera: CameraModel,
+        seconds: float,
+    ) -> None:
+        d_th_rad = self._config.attention.d_th_rad
+        drawn = annotated(image, percept, camera, d_th_rad, seconds)
+        self._says_annotated.publish(encode_image(drawn, header.stamp, header.frame_id))
+
+    def _camera(self, image: NDArray[np.uint8]) -> CameraModel:
+        """The calibrated camera for images of this size, or an ideal one."""
+        height, width = image.shape[:2]
+        camera = None
+        if self._calibration is not None:
+            info = self._calibration
+            camera = CameraModel.from_calibration(
+                info.width or width, info.height or height, info.k, info.d
+            )
+        if camera is None:
+            field_of_view_rad = self._input.field_of_view_rad
+            self.problem(
+                'calibration',
+                'the camera is not calibrated: a horizontal view of '
+                f'{math.degrees(field_of_view_rad):.0f} degrees is assumed (field_of_view_rad)',
+                Level.WARN,
+            )
+            return CameraModel.from_field_of_view(width, height, field_of_view_rad)
+        return camera.resized(width, height)
+
+
+def _point(header: Header, detection: Detection) -> PointStamped:
+    return PointStamped(header=header, point=Point(x=detection.x, y=detection.y, z=1.0))
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    spin_node(SalientFeatureDetectorNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,61 @@
+"""digital_head: a pan-tilt head without motors, moving a window inside a wide picture."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sensor_msgs.msg import Image, JointState
+from std_msgs.msg import Header
+
+from ja_common.core.config import parameter
+from ja_common.graph_node import GraphNode, spin_node
+from ja_common.image_codec import decode_image, encode_camera_info, encode_image
+from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.time_codec import to_ns
+from ja_common.topics import CAMERA_INFO, IMAGE, JOINT_COMMANDS, JOINT_STATES, WIDE_IMAGE
+from ja_sim.core.digital_head import DigitalHead, DigitalHeadConfig
+
+
+@dataclass(frozen=True)
+class FrameConfig:
+    """Names on the wire."""
+
+    frame_id: str = parameter('camera_optical_frame', 'optical frame of the window')
+
+
+class DigitalHeadNode(GraphNode):
+    """For every wide picture: the head's posture, calibration and view, with its stamp."""
+
+    def __init__(self, **node_kwargs: Any) -> None:
+        super().__init__('digital_head', **node_kwargs)
+        self._config = self.configure(DigitalHeadConfig)
+        self._frame_id = self.configure(FrameConfig).frame_id
+        self._joints = JointCodec(self.configure(JointConfig))
+        self._head = DigitalHead(self._config)
+        self._says_joints = self.say(JOINT_STATES)
+        self._says_info = self.say(CAMERA_INFO)
+        self._says_image = self.say(IMAGE)
+        self.hear(JOINT_COMMANDS, self._on_command)
+        self.hear(WIDE_IMAGE, self._on_wide_image, expected_every_s=2.0)
+
+    def _on_command(self, message: JointState) -> None:
+        posture = self._joints.decode(message)
+        if posture is not None:
+            self._head.command(posture)
+
+    def _on_wide_image(self, message: Image) -> None:
+        view, posture = self._head.look(decode_image(message), to_ns(message.header.stamp))
+        header = Header(stamp=message.header.stamp, frame_id=self._frame_id)
+        self._says_joints.publish(self._joints.encode(header, posture.position, posture.velocity))
+        width, height = self._config.view_width_px, self._config.view_height_px
+        self._says_info.publish(encode_camera_info(header, width, height, self._head.focal_px))
+        self._says_image.publish(encode_image(view, header.stamp, header.frame_id))
+
+
+def main(args: Sequence[str] | None = None) -> None:
+    """Run the node."""
+    spin_node(DigitalHeadNode, args)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,214 @@
+"""The detector as a node: one detections message an image, with the image's own header."""
+
+import numpy as np
+import pytest
+import rclpy
+from builtin_interfaces.msg import Time
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import Image, JointState
+from std_msgs.msg import Header
+
+from ja_common.core.detection import Kind, caregiver_face
+from ja_common.detection_codec import decode_detections
+from ja_common.image_codec import decode_image, encode_camera_info, encode_image
+from ja_common.time_codec import to_ns, to_time
+from ja_common.topics import (
+    CAMERA_INFO,
+    DETECTIONS,
+    DIAGNOSTICS,
+    FACE,
+    FACE_IMAGE,
+    IMAGE,
+    IMAGE_ANNOTATED,
+    JOINT_STATES,
+    TARGET,
+)
+from ja_perception.salient_feature_detector_node import SalientFeatureDetectorNode
+from ros_testing import spin_until
+from synthetic_pictures import draw_ball, draw_face, room
+
+FOCAL_PX = 492.4  # 320 px across 36 degrees
+PERIOD_NS = 100_000_000
+
+
+class Rig:
+    """Publishes what a rig would, and keeps all that the detector says."""
+
+    def __init__(self, context, **parameters):
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        self.detector = SalientFeatureDetectorNode(context=context, parameter_overrides=overrides)
+        self.node = rclpy.create_node('rig', context=context)
+        self.executor = SingleThreadedExecutor(context=context)
+        self.executor.add_node(self.detector)
+        self.executor.add_node(self.node)
+        self.heard = []
+        for topic in (DETECTIONS, FACE_IMAGE, TARGET, FACE, DIAGNOSTICS):
+            self.listen(topic)
+        self.publishers = {
+            topic.name: self.node.create_publisher(topic.type, topic.name, topic.says)
+            for topic in (IMAGE, CAMERA_INFO, JOINT_STATES)
+        }
+        self.wait(lambda: all(p.get_subscription_count() for p in self.publishers.values()))
+
+    def listen(self, topic):
+        def keep(message):
+            self.heard.append((topic.name, message))
+
+        self.node.create_subscription(topic.type, topic.name, keep, topic.says)
+        self.wait(lambda: self.node.count_publishers(topic.name))
+
+    def wait(self, condition, timeout_s=10.0):
+        spin_until(self.executor, condition, timeout_s)
+
+    def all_of(self, topic):
+        return [message for name, message in self.heard if name == topic.name]
+
+    def joints(self, stamp_ns, pan=0.0, tilt=0.0, speed=0.0):
+        self.publishers[JOINT_STATES.name].publish(
+            JointState(
+                header=Header(stamp=to_time(stamp_ns)),
+                name=['pan', 'tilt'],
+                position=[pan, tilt],
+                velocity=[speed, 0.0],
+            )
+        )
+
+    def image(self, stamp_ns, picture):
+        header = Header(stamp=to_time(stamp_ns), frame_id='eye')
+        height, width = picture.shape[:2]
+        info = encode_camera_info(header, width, height, FOCAL_PX * width / 320)
+        self.publishers[CAMERA_INFO.name].publish(info)
+        self.publishers[IMAGE.name].publish(encode_image(picture, header.stamp, 'eye'))
+
+    def answer(self, count=1):
+        self.wait(lambda: len(self.all_of(DETECTIONS)) >= count)
+        return self.all_of(DETECTIONS)[-1]
+
+    def diagnosis(self, text):
+        def found():
+            return [
+                s
+                for m in self.all_of(DIAGNOSTICS)
+                for s in m.status
+                if 'salient' in s.name and text in s.message
+            ]
+
+        self.wait(found)
+        return found()[0]
+
+    def close(self):
+        self.executor.shutdown()
+        self.detector.destroy_node()
+        self.node.destroy_node()
+
+
+@pytest.fixture
+def rig(ros_context):
+    rig = Rig(ros_context)
+    yield rig
+    rig.close()
+
+
+def caregiver_and_ball():
+    picture = room()
+    draw_face(picture, 160, 120, 80)
+    draw_ball(picture, 280, 60, 14)
+    return picture
+
+
+def test_header_goes_on_unchanged_and_empty_images_are_answered_too(rig):
+    for count in range(1, 4):
+        stamp_ns = count * PERIOD_NS
+        rig.joints(stamp_ns)
+        rig.image(stamp_ns, room())
+        message = rig.answer(count)
+        assert to_ns(message.header.stamp) == stamp_ns
+        assert message.header.frame_id == 'eye'
+        assert decode_detections(message) == []
+    assert not rig.all_of(FACE_IMAGE)
+
+
+def test_attended_face_comes_with_its_picture(rig):
+    rig.joints(PERIOD_NS)
+    rig.image(PERIOD_NS, caregiver_and_ball())
+    detections = decode_detections(rig.answer())
+    face, ball = detections
+    assert face.kind is Kind.FACE
+    assert face.attended
+    assert (ball.u, ball.v) == pytest.approx((280, 60), abs=1)
+    assert ball.ray == pytest.approx((120.5 / FOCAL_PX, -59.5 / FOCAL_PX), abs=0.003)
+    rig.wait(lambda: rig.all_of(FACE_IMAGE))
+    (picture,) = rig.all_of(FACE_IMAGE)
+    assert (picture.height, picture.width, picture.encoding) == (30, 25, 'mono8')
+    assert to_ns(picture.header.stamp) == PERIOD_NS
+    rig.wait(lambda: rig.all_of(TARGET) and rig.all_of(FACE))
+    assert rig.all_of(TARGET)[0].point.x == pytest.approx(ball.x)
+
+
+def test_moving_head_does_not_attend(rig):
+    rig.joints(PERIOD_NS, speed=0.5)
+    rig.image(PERIOD_NS, caregiver_and_ball())
+    face = caregiver_face(decode_detections(rig.answer()))
+    assert face is not None
+    assert not face.attended
+
+
+def test_image_waits_for_the_posture_at_its_own_stamp(rig):
+    rig.joints(PERIOD_NS)
+    rig.image(PERIOD_NS, room())
+    rig.answer()
+    rig.image(2 * PERIOD_NS, room())
+    rig.wait(lambda: 'heard the image' if rig.detector._images._waiting else None)
+    assert len(rig.all_of(DETECTIONS)) == 1
+    rig.joints(2 * PERIOD_NS)
+    assert to_ns(rig.answer(2).header.stamp) == 2 * PERIOD_NS
+
+
+def test_fixed_camera_without_joint_states_still_detects_and_says_so(rig):
+    rig.image(PERIOD_NS, caregiver_and_ball())
+    detections = decode_detections(rig.answer())
+    assert [d.kind for d in detections] == [Kind.FACE, Kind.OBJECT]
+    assert not any(d.attended for d in detections)
+    assert rig.diagnosis('no joint state').level == b'\x01'
+
+
+def test_broken_image_gives_one_clear_error_and_the_node_lives_on(rig):
+    rig.joints(PERIOD_NS)
+    broken = Image(width=4, height=4, encoding='rgb8', step=12, data=b'short')
+    broken.header.stamp = Time(nanosec=PERIOD_NS)
+    info = encode_camera_info(broken.header, 4, 4, 4.0)
+    rig.publishers[CAMERA_INFO.name].publish(info)
+    rig.publishers[IMAGE.name].publish(broken)
+    assert 'image_raw: 5 bytes of data' in rig.diagnosis('image_raw').message
+    rig.joints(2 * PERIOD_NS)
+    rig.image(2 * PERIOD_NS, room())
+    assert to_ns(rig.answer().header.stamp) == 2 * PERIOD_NS
+
+
+def test_annotated_image_only_for_a_subscriber(rig):
+    rig.joints(PERIOD_NS)
+    rig.image(PERIOD_NS, caregiver_and_ball())
+    rig.answer()
+    rig.listen(IMAGE_ANNOTATED)
+    rig.wait(lambda: rig.detector._says_annotated.get_subscription_count())
+    rig.joints(2 * PERIOD_NS)
+    rig.image(2 * PERIOD_NS, caregiver_and_ball())
+    rig.wait(lambda: rig.all_of(IMAGE_ANNOTATED))
+    (drawn,) = rig.all_of(IMAGE_ANNOTATED)
+    assert to_ns(drawn.header.stamp) == 2 * PERIOD_NS
+    assert np.unique(decode_image(drawn).reshape(-1, 3), axis=0).shape[0] > 50
+
+
+def test_bad_parameter_is_refused_and_changes_nothing(rig):
+    (result,) = rig.detector.set_parameters([Parameter('alpha_col', value=-1.0)])
+    assert not result.successful
+    assert rig.detector.get_parameter('alpha_col').value == 1.0
+
+
+def test_alpha_changes_while_running(rig):
+    (result,) = rig.detector.set_parameters([Parameter('alpha_col', value=0.0)])
+    assert result.successful
+    rig.joints(PERIOD_NS)
+    rig.image(PERIOD_NS, caregiver_and_ball())
+    assert [d.kind for d in decode_detections(rig.answer())] == [Kind.FACE]
