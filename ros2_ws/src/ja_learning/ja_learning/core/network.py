@@ -28,6 +28,11 @@ class NetworkConfig:
     angle_scale_rad: float = parameter(
         float(np.radians(40)), 'angle that stands for 1 at input and output', low=0.01, high=3.15
     )
+    face_scaling: str = parameter(
+        'centred',
+        'pixels as fractions of white minus a half, or standardised to mean 0 and deviation 1',
+        choices=('centred', 'standardised'),
+    )
     initial_weight: float = parameter(
         0.05, 'weights start uniformly within +- this', low=0.0, high=10.0
     )
@@ -114,7 +119,10 @@ class ThreeLayerNetwork:
         return torch.nn.functional.linear(hidden, p['output_weights'], p['output_biases'])
 
     def _inputs(self, face: NDArray[Any], postures: NDArray[np.float64]) -> torch.Tensor:
-        pixels = np.broadcast_to(face.ravel() / 255.0 - 0.5, (len(postures), face.size))
+        pixels = face.ravel() / 255.0 - 0.5
+        if self.config.face_scaling == 'standardised':
+            pixels = (pixels - pixels.mean()) / max(float(pixels.std()), 1e-3)
+        pixels = np.broadcast_to(pixels, (len(postures), face.size))
         return torch.from_numpy(
             np.hstack([pixels, postures / self.config.angle_scale_rad]).astype(np.float32)
         )
