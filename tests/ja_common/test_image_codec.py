@@ -4,8 +4,9 @@ import cv2
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from ja_common.image_codec import ImageError, decode_compressed, decode_image, encode_image
 from sensor_msgs.msg import CompressedImage, Image
+
+from ja_common.image_codec import ImageError, decode_compressed, decode_image, encode_image
 
 RGB = np.random.default_rng(1).integers(0, 256, (5, 7, 3), np.uint8)
 GREY = RGB[..., 0]
@@ -61,9 +62,7 @@ def test_bayer_mosaic_of_one_colour_gives_that_colour(pattern, bits):
     mosaic = np.tile(cell, (4, 5)).astype(np.uint16 if bits == 16 else np.uint8)
     if bits == 16:
         mosaic <<= 8
-    decoded = decode_image(
-        message(mosaic, f'bayer_{pattern}{bits}', 10, 8, mosaic.strides[0])
-    )
+    decoded = decode_image(message(mosaic, f'bayer_{pattern}{bits}', 10, 8, mosaic.strides[0]))
     assert np.array_equal(decoded[2:-2, 2:-2], np.broadcast_to((200, 120, 40), (4, 6, 3)))
 
 
