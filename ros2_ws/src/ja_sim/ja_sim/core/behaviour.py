@@ -35,6 +35,25 @@ class Look:
     head_noise_rad: tuple[float, float]
 
 
+class Blinking:
+    """Lids that close for a moment, at random but with a given mean rate."""
+
+    CLOSED_S = 0.15
+
+    def __init__(self, rate_hz: float, rng: np.random.Generator) -> None:
+        self._rate_hz, self._rng = rate_hz, rng
+        self._next_s = self._wait()
+
+    def closed(self, now_s: float) -> bool:
+        """True while a blink lasts; ``now_s`` must not decrease from call to call."""
+        while now_s >= self._next_s + self.CLOSED_S:
+            self._next_s += self.CLOSED_S + self._wait()
+        return now_s >= self._next_s
+
+    def _wait(self) -> float:
+        return self._rng.exponential(1.0 / self._rate_hz) if self._rate_hz else math.inf
+
+
 class CaregiverBehaviour:
     """Counts the looks at her and decides what she attends to."""
 

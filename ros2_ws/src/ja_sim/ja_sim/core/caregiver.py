@@ -1,6 +1,14 @@
-"""The caregiver's body in the scene: a head and two eyes that turn, on a torso that sits."""
+"""The caregiver's body in the scene: who she is, and how head, eyes and lids stand.
+
+The meshes come from MakeHuman by way of ``tools/make_caregiver_asset.py``; see ``assets/ORIGIN.md``.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -8,53 +16,132 @@ import numpy as np
 from ja_common.core.geometry import head_rotation, vectors_of_directions
 
 from .gaze import GazePose
-from .scene import CaregiverSpec
+from .scene import CaregiverSpec, SceneError
 
-_BALL = mujoco.mjtGeom.mjGEOM_ELLIPSOID
-_NECK_TO_FACE = np.array([0.10, 0.0, 0.12])
+SKIN_TONES = (
+    (0.96, 0.80, 0.70),
+    (0.90, 0.72, 0.60),
+    (0.80, 0.61, 0.48),
+    (0.64, 0.46, 0.35),
+    (0.47, 0.33, 0.25),
+)
+HAIR_COLOURS = ((0.10, 0.09, 0.09), (0.23, 0.17, 0.14), (0.40, 0.31, 0.24), (0.58, 0.56, 0.54))
+IRIS_COLOURS = ((0.20, 0.13, 0.09), (0.30, 0.22, 0.14), (0.30, 0.38, 0.40))
+SHIRT_COLOURS = ((0.33, 0.36, 0.40), (0.52, 0.52, 0.50), (0.26, 0.26, 0.28), (0.60, 0.57, 0.52))
+SIDES = ('left', 'right')
+_SKIN_FILE = 'caregiver_skin.png'
+_SHOWN, _HIDDEN = 0, 5  # groups of geoms: MuJoCo draws the first three
+_MESH = mujoco.mjtGeom.mjGEOM_MESH
+_ELLIPSOID = mujoco.mjtGeom.mjGEOM_ELLIPSOID
+# In radii of the eyeball, along the gaze: the discs lie just above the white.
+_IRIS = {'pos': (0.86, 0.0, 0.0), 'size': (0.17, 0.46, 0.46)}
+_PUPIL = {'pos': (0.95, 0.0, 0.0), 'size': (0.10, 0.20, 0.20)}
+_LID = {'pos': (0.0, 0.0, 0.0), 'size': (1.07, 1.07, 1.07)}
+
+
+@dataclass(frozen=True)
+class Appearance:
+    """Who she is today; colours are RGB in 0..1."""
+
+    identity: str
+    skin: tuple[float, float, float]
+    hair: tuple[float, float, float]
+    iris: tuple[float, float, float]
+    shirt: tuple[float, float, float]
+
+
+def identities() -> list[str]:
+    """Names of the people in the asset."""
+    return [str(name) for name in _asset()['identities']]
+
+
+def draw_appearance(spec: CaregiverSpec, rng: np.random.Generator) -> Appearance:
+    """Draw a person: the one that the specification names, or any."""
+    people = identities()
+    if spec.identity != 'any' and spec.identity not in people:
+        raise SceneError(
+            f"caregiver: no identity '{spec.identity}': choose any or {', '.join(people)}"
+        )
+    index = int(rng.integers(len(people)))
+    skin, hair, iris, shirt = (
+        colours[int(rng.integers(len(colours)))]
+        for colours in (SKIN_TONES, HAIR_COLOURS, IRIS_COLOURS, SHIRT_COLOURS)
+    )
+    identity = people[index] if spec.identity == 'any' else spec.identity
+    return Appearance(identity, skin, hair, iris, shirt)
+
+
+@cache
+def _asset() -> dict[str, np.ndarray]:
+    with (resources.files('ja_sim') / 'assets' / 'caregiver.npz').open('rb') as file:
+        return dict(np.load(file))
 
 
 class CaregiverBodies:
-    """Bodies of the caregiver; ``eyes`` (2, 3) and ``face`` (3,) are in her rest frame [m]."""
+    """Her bodies in the compiled scene; ``eyes`` (2, 3) and ``face`` (3,) are in the rest frame."""
 
     def __init__(self, spec: mujoco.MjSpec, caregiver: CaregiverSpec) -> None:
         direction = np.radians([caregiver.pan_deg, caregiver.tilt_deg])
+        self._face_at = caregiver.distance_m * vectors_of_directions(direction)
         self._facing = head_rotation([direction[0] + np.pi, 0.0])
-        face = caregiver.distance_m * vectors_of_directions(direction)
-        self.face = _NECK_TO_FACE
-        self.origin = face - self._facing @ self.face
-        self.eyes = np.array([[0.075, 0.032, 0.135], [0.075, -0.032, 0.135]])
-        skin, dark = [0.85, 0.66, 0.56, 1.0], [0.2, 0.15, 0.13, 1.0]
+        _add_skin(spec)
         head = spec.worldbody.add_body(name='caregiver_head', mocap=True)
-        head.add_geom(type=_BALL, pos=[0, 0, 0.12], size=[0.095, 0.075, 0.12], rgba=skin)
-        head.add_geom(type=_BALL, pos=[-0.02, 0, 0.15], size=[0.1, 0.08, 0.11], rgba=dark)
-        head.add_geom(type=_BALL, pos=[0.095, 0, 0.10], size=[0.02, 0.014, 0.025], rgba=skin)
-        head.add_geom(
-            type=_BALL, pos=[0.082, 0, 0.06], size=[0.01, 0.025, 0.007], rgba=[0.7, 0.4, 0.4, 1]
-        )
-        for side in (1, -1):
-            head.add_geom(
-                type=_BALL, pos=[0.083, side * 0.032, 0.16], size=[0.006, 0.02, 0.004], rgba=dark
-            )
-        for name in ('left_eye', 'right_eye'):
-            eye = spec.worldbody.add_body(name=f'caregiver_{name}', mocap=True)
-            eye.add_geom(type=_BALL, size=[0.015, 0.015, 0.011], rgba=[0.9, 0.9, 0.88, 1])
-            eye.add_geom(type=_BALL, pos=[0.012, 0, 0], size=[0.004, 0.007, 0.007], rgba=dark)
-        torso = spec.worldbody.add_body(name='caregiver_torso', pos=self.origin)
-        torso.add_geom(
-            type=_BALL, pos=[0.03, 0, -0.35], size=[0.13, 0.22, 0.33], rgba=[0.35, 0.37, 0.40, 1]
-        )
-        torso.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-            pos=[0.02, 0, -0.02],
-            size=[0.05, 0.06, 0],
-            rgba=skin,
-        )
+        torso = spec.worldbody.add_body(name='caregiver_torso', mocap=True)
+        for name in identities():
+            _add_person(spec, head, torso, name)
+        for side in SIDES:
+            eye = spec.worldbody.add_body(name=f'{side}_eye', mocap=True)
+            lid = spec.worldbody.add_body(name=f'{side}_lid', mocap=True)
+            for body, part in ((eye, 'white'), (eye, 'iris'), (eye, 'pupil'), (lid, 'lid')):
+                # Any size will do until somebody is there to measure.
+                body.add_geom(
+                    name=f'{side}_{part}',
+                    type=_ELLIPSOID,
+                    size=[0.01, 0.01, 0.01],
+                    material='skin' if part == 'lid' else 'eye',
+                )
 
     def bind(self, model: mujoco.MjModel) -> None:
         """Look up what moves."""
-        names = ('caregiver_head', 'caregiver_left_eye', 'caregiver_right_eye')
+        self._model = model
+        names = ['caregiver_torso', 'caregiver_head']
+        names += [f'{side}_{part}' for part in ('eye', 'lid') for side in SIDES]
         self._mocap = [model.body(name).mocapid[0] for name in names]
+        self._lids = [model.geom(f'{side}_lid').id for side in SIDES]
+        parts = [model.geom(f'{s}_{p}').id for s in SIDES for p in ('iris', 'pupil')]
+        model.geom_sameframe[parts] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
+
+    def dress(self, look: Appearance) -> None:
+        """Become somebody: meshes, eyes and colours; nothing is recompiled."""
+        asset, model = _asset(), self._model
+        self.eyes = asset[f'{look.identity}.eyes'].astype(float)
+        self.face = asset[f'{look.identity}.face'].astype(float)
+        self.origin = self._face_at - self._facing @ self.face
+        for name in identities():
+            shown = _SHOWN if name == look.identity else _HIDDEN
+            for part in ('head', 'hair', 'shirt'):
+                model.geom_group[model.geom(f'{name}_{part}').id] = shown
+        for part in ('hair', 'shirt'):
+            model.geom_rgba[model.geom(f'{look.identity}_{part}').id, :3] = getattr(look, part)
+        model.geom_rgba[model.geom(f'{look.identity}_head').id, :3] = look.skin
+        radius = float(asset[f'{look.identity}.eye_radius'])
+        for side in SIDES:
+            self._dress_eye(side, radius, look)
+
+    def _dress_eye(self, side: str, radius: float, look: Appearance) -> None:
+        lid_skin = tuple(0.85 * value for value in look.skin)
+        white = {'pos': (0.0, 0.0, 0.0), 'size': (1.0, 1.0, 1.0)}
+        parts: dict[str, tuple[dict[str, Any], tuple[float, ...]]] = {
+            'white': (white, (0.86, 0.85, 0.83)),
+            'iris': (_IRIS, look.iris),
+            'pupil': (_PUPIL, (0.03, 0.03, 0.03)),
+            'lid': (_LID, lid_skin),
+        }
+        for part, (shape, colour) in parts.items():
+            geom = self._model.geom(f'{side}_{part}').id
+            self._model.geom_pos[geom] = radius * np.array(shape['pos'])
+            self._model.geom_size[geom] = radius * np.array(shape['size'])
+            self._model.geom_rgba[geom, :3] = colour
 
     def to_rest_frame(self, point: np.ndarray) -> np.ndarray:
         """A point (3,) of the base frame in her rest frame [m]."""
@@ -64,11 +151,55 @@ class CaregiverBodies:
         """Centre of her face (3,) [m] in the base frame, in a posture."""
         return self.origin + self._facing @ head_rotation(pose.head) @ self.face
 
-    def place(self, data: mujoco.MjData, pose: GazePose) -> None:
-        """Turn head and eyes."""
+    def place(self, data: mujoco.MjData, pose: GazePose, eyes_closed: bool) -> None:
+        """Turn head and eyes, and open or close the lids."""
         head = self._facing @ head_rotation(pose.head)
-        turned = [head] + [head @ head_rotation(eye) for eye in pose.eyes]
-        offsets = [np.zeros(3), *self.eyes]
-        for mocap, rotation, offset in zip(self._mocap, turned, offsets, strict=True):
+        eyes = [head @ head_rotation(eye) for eye in pose.eyes]
+        rotations = [self._facing, head, *eyes, head, head]
+        offsets = [np.zeros(3), np.zeros(3), *self.eyes, *self.eyes]
+        for mocap, rotation, offset in zip(self._mocap, rotations, offsets, strict=True):
             data.mocap_pos[mocap] = self.origin + head @ offset
             mujoco.mju_mat2Quat(data.mocap_quat[mocap], rotation.ravel())
+        self._model.geom_group[self._lids] = _SHOWN if eyes_closed else _HIDDEN
+
+
+def _add_skin(spec: mujoco.MjSpec) -> None:
+    """The painted skin, and materials that take their colour from each geom."""
+    picture = resources.files('ja_sim') / 'assets' / _SKIN_FILE
+    spec.assets = {**spec.assets, _SKIN_FILE: picture.read_bytes()}
+    spec.add_texture(name='skin', type=mujoco.mjtTexture.mjTEXTURE_2D, file=_SKIN_FILE)
+    layers = [''] * int(mujoco.mjtTextureRole.mjNTEXROLE)
+    layers[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = 'skin'
+    spec.add_material(name='painted_skin', textures=layers, specular=0.08, shininess=0.2)
+    spec.add_material(name='skin', specular=0.08, shininess=0.2)
+    spec.add_material(name='hair', specular=0.15, shininess=0.3)
+    spec.add_material(name='cloth', specular=0.0)
+    spec.add_material(name='eye', specular=0.3, shininess=0.8)
+
+
+def _add_person(
+    spec: mujoco.MjSpec, head: mujoco.MjsBody, torso: mujoco.MjsBody, name: str
+) -> None:
+    asset = _asset()
+    uv = asset['head_uv']
+    parts = (
+        ('head', head, 'painted_skin', asset['head_faces']),
+        ('hair', head, 'hair', asset[f'{name}.hair_faces']),
+        ('shirt', torso, 'cloth', asset['shirt_faces']),
+    )
+    for part, body, material, faces in parts:
+        mesh = spec.add_mesh(name=f'{name}_{part}', inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+        mesh.uservert = asset[f'{name}.{part}'].ravel()
+        mesh.userface = faces.ravel().astype(np.int32)
+        if part == 'head':
+            mesh.usernormal = asset[f'{name}.normals'].ravel()
+            mesh.usertexcoord = uv.ravel()
+        body.add_geom(
+            name=mesh.name,
+            type=_MESH,
+            meshname=mesh.name,
+            material=material,
+            rgba=[1.0, 1.0, 1.0, 1.0],
+            contype=0,
+            conaffinity=0,
+        )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import colorsys
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -17,6 +17,7 @@ SHAPES = ('sphere', 'box', 'cylinder', 'ellipsoid', 'capsule')
 PATTERNS = ('plain', 'checker', 'dots', 'cross')
 MOTION_RADIUS_M = 0.015
 MOTION_RATE_HZ = 0.8
+CEILING_HEIGHT_M = 1.5
 _TRIES = 1000
 
 
@@ -61,7 +62,7 @@ class Arrangement:
             self.things = self._new_things(positions)
         else:
             pairs = zip(self.things, positions, strict=True)
-            self.things = [_moved(thing, position) for thing, position in pairs]
+            self.things = [replace(thing, position=position) for thing, position in pairs]
 
     def draw_place(self) -> np.ndarray:
         """Any point (3,) [m] of the space that objects may be in."""
@@ -115,10 +116,6 @@ class Arrangement:
         return things
 
 
-def _moved(thing: Thing, position: np.ndarray) -> Thing:
-    return Thing(**{**thing.__dict__, 'position': position})
-
-
 _GEOMS = {
     'sphere': (mujoco.mjtGeom.mjGEOM_SPHERE, (1.0, 1.0, 1.0)),
     'box': (mujoco.mjtGeom.mjGEOM_BOX, (0.8, 0.8, 0.8)),
@@ -163,9 +160,11 @@ class ObjectBodies:
             model.geom_rgba[geom] = (*thing.colour, 1.0)
             model.geom_matid[geom] = self._material[thing.pattern]
             model.geom_quat[geom] = thing.quaternion
-            half = max(thing.position[2] - self._table_height, 0.01) / 2.0
-            model.geom_size[stand, 1] = half
-            model.geom_pos[stand] = (0.0, 0.0, -half)
+            # Low things stand on the table, high ones hang, so that no rod crosses her face.
+            height = float(thing.position[2])
+            end = self._table_height if height < 0.0 else CEILING_HEIGHT_M
+            model.geom_size[stand, 1] = abs(end - height) / 2.0
+            model.geom_pos[stand, 2] = (end - height) / 2.0
 
     def place(self, data: mujoco.MjData, positions: np.ndarray) -> None:
         """Put the bodies at positions (N, 3) [m]."""

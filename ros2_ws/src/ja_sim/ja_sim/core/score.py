@@ -70,16 +70,19 @@ class Score:
         self._fixated: tuple[float, float] | None = None
         self._success = False
         self._recent: deque[bool] = deque(maxlen=window)
-        self._rates: dict[str, list[bool]] = {}
+        self._rates: dict[str, Rate] = {}
 
     def see(self, truth: TruthAt, fixation: ArrayLike | None) -> Outcome | None:
         """One image: the truth and the fixation (2,) [rad] at its stamp; what just ended, if any.
 
-        A trial ends when the next begins. What happens before the first look belongs to none.
+        A trial ends when the next begins. What happens before the first look belongs to none, and
+        one that a reset of the world cuts off does not count.
         """
         ended = None
         if self._truth is not None and truth.trial != self._truth.trial:
-            ended = self._close(self._truth)
+            if truth.trial > self._truth.trial:
+                ended = self._close(self._truth)
+            self._fixated, self._success = None, False
         self._truth = truth
         if fixation is not None and self._fixated is None and truth.trial > 0:
             nearest = int(np.argmin(angle_between(truth.directions, fixation)))
@@ -89,12 +92,9 @@ class Score:
 
     def rates(self) -> dict[str, Rate]:
         """Rates by name: 'all', 'recent', 'in_view', 'out_of_view', and 'objects_N'."""
-        found = {name: Rate(sum(results), len(results)) for name, results in self._rates.items()}
-        return {'recent': Rate(sum(self._recent), len(self._recent)), **found}
+        return {'recent': Rate(sum(self._recent), len(self._recent)), **self._rates}
 
     def _close(self, truth: TruthAt) -> Outcome | None:
-        fixated, success = self._fixated, self._success
-        self._fixated, self._success = None, False
         if truth.trial <= 0:
             return None
         outcome = Outcome(
@@ -106,11 +106,12 @@ class Score:
                 float(truth.directions[truth.attended][0]),
                 float(truth.directions[truth.attended][1]),
             ),
-            fixated,
-            success,
+            self._fixated,
+            self._success,
         )
-        self._recent.append(success)
+        self._recent.append(self._success)
         view = 'in_view' if truth.in_view else 'out_of_view'
         for name in ('all', view, f'objects_{outcome.objects}'):
-            self._rates.setdefault(name, []).append(success)
+            before = self._rates.get(name, Rate(0, 0))
+            self._rates[name] = Rate(before.successes + self._success, before.trials + 1)
         return outcome

@@ -16,12 +16,13 @@ import numpy as np
 
 from ja_common.core.geometry import angle_between, directions_of_vectors, head_rotation
 
-from .behaviour import ROBOT, CaregiverBehaviour
+from .behaviour import ROBOT, Blinking, CaregiverBehaviour
 from .camera import Intrinsics, Observation, expose
-from .caregiver import CaregiverBodies
+from .caregiver import CaregiverBodies, draw_appearance
 from .gaze import GazePose, GazeShift
 from .head import JointSample, PanTiltHead
 from .objects import Arrangement, ObjectBodies, Thing
+from .light import Lighting
 from .render import Renderer
 from .scene import Scene
 
@@ -61,6 +62,7 @@ class _View:
     posture: np.ndarray
     velocity: np.ndarray
     gaze: GazePose
+    eyes_closed: bool
     things: list[Thing]
     positions: np.ndarray
 
@@ -84,6 +86,7 @@ class JointAttentionWorld:
         self._caregiver.bind(self._model)
         table = self._model.geom('table')
         self._objects.bind(self._model, float(table.pos[2] + table.size[2]))
+        self._lighting = Lighting(self._model)
         self._camera_mocap = self._model.body('camera').mocapid[0]
         self._renderer: Renderer | None = None
         self.reset()
@@ -101,18 +104,21 @@ class JointAttentionWorld:
     def reset(self, seed: int | None = None) -> None:
         """Start again at time zero, with another seed if one is given."""
         self._seed = self._seed if seed is None else seed
-        streams = np.random.SeedSequence(self._seed).spawn(4)
-        objects, behaviour, self._encoder_rng, self._image_rng = map(
+        streams = np.random.SeedSequence(self._seed).spawn(6)
+        looks, objects, behaviour, blinks, self._encoder_rng, self._image_rng = map(
             np.random.default_rng, streams
         )
         self._now_ns = START_NS
         self.clamped = False
         self._head.reset()
         caregiver = self._caregiver
+        caregiver.dress(draw_appearance(self.scene.caregiver, looks))
+        self._lighting.vary(self.scene.room.light_variation, looks)
         self._gaze = GazeShift(caregiver.eyes, caregiver.to_rest_frame(np.zeros(3)))
         face = caregiver.face_position(self._gaze.pose(0.0))
         self._arrangement = Arrangement(self.scene.objects, face, objects)
         self._behaviour = CaregiverBehaviour(self.scene.caregiver, behaviour)
+        self._blinking = Blinking(self.scene.caregiver.blink_rate_hz, blinks)
         self._attended, self._elsewhere, self._in_view = ROBOT, np.zeros(3), False
         self._film: deque[_View] = deque([self._view()])
         self._observation: Observation | None = None
@@ -251,13 +257,14 @@ class JointAttentionWorld:
             self._head.posture,
             self._head.velocity,
             self._gaze.pose(self._time_s, self._target_now()),
+            self._blinking.closed(self._time_s),
             self._arrangement.things,
             self._positions(),
         )
 
     def _draw(self, view: _View) -> np.ndarray:
         data = self._data
-        self._caregiver.place(data, view.gaze)
+        self._caregiver.place(data, view.gaze, view.eyes_closed)
         self._objects.dress(view.things)
         self._objects.place(data, view.positions)
         rotation = head_rotation(view.posture)

