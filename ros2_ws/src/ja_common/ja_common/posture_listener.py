@@ -28,6 +28,11 @@ class PostureListener:
         """The latest measured posture: for holding the head, not for looking at an image."""
         return self._history.newest
 
+    @property
+    def is_behind(self) -> bool:
+        """Does an image wait for the joint states of its time?"""
+        return len(self._actions) > 0
+
     def when_known(self, stamp_ns: int, action: Action) -> None:
         """Call `action` with the posture at a stamp, now or when the joint states have come.
 

@@ -1,7 +1,7 @@
 """The head's posture at the moment an image was taken, from the stream of joint states."""
 
 from bisect import bisect_left
-from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -96,34 +96,39 @@ class PostureJoin(Generic[Item]):
 
     An item whose posture can no longer become known (older than the history, or more than
     `depth` items waiting) is given with None, so that the caller can say so: nothing is lost.
+    An item from the future (a clock that was set back) waits without holding up the others.
     """
 
     def __init__(self, history: PostureHistory, depth: int = 32) -> None:
         self._history = history
         self._depth = depth
-        self._waiting: deque[tuple[int, Item]] = deque()
+        self._waiting: list[tuple[int, Item]] = []
 
     def add(self, stamp_ns: int, item: Item) -> None:
         """Let an item wait for its posture."""
         self._waiting.append((stamp_ns, item))
 
-    def ready(self) -> list[tuple[Item, Posture | None]]:
-        """Items whose waiting is over, oldest first, with their posture (None: unknowable)."""
-        done: list[tuple[Item, Posture | None]] = []
-        while self._waiting:
-            stamp_ns, item = self._waiting[0]
-            posture = self._history.at(stamp_ns)
-            newest = self._history.newest
-            still_to_come = newest is None or newest.stamp_ns < stamp_ns
-            if posture is None and still_to_come and len(self._waiting) <= self._depth:
-                break
-            self._waiting.popleft()
-            done.append((item, posture))
-        return done
+    def __len__(self) -> int:
+        """How many items wait."""
+        return len(self._waiting)
 
-    def clear(self) -> None:
-        """Forget all that waits."""
-        self._waiting.clear()
+    def ready(self) -> Iterator[tuple[Item, Posture | None]]:
+        """Items whose waiting is over, oldest first, with their posture (None: unknowable).
+
+        An item is taken out when it is given: if its handling fails, those after it still wait.
+        """
+        while (index := self._first_ready()) is not None:
+            stamp_ns, item = self._waiting.pop(index)
+            yield item, self._history.at(stamp_ns)
+
+    def _first_ready(self) -> int | None:
+        if len(self._waiting) > self._depth:
+            return 0
+        newest = self._history.newest
+        if newest is None:
+            return None
+        stamps = (stamp_ns for stamp_ns, _ in self._waiting)
+        return next((i for i, stamp_ns in enumerate(stamps) if stamp_ns <= newest.stamp_ns), None)
 
 
 def _two_finite(what: str, values: ArrayLike) -> NDArray[np.float64]:

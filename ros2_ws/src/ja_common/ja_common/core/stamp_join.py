@@ -7,9 +7,10 @@ from typing import Any
 class StampJoin:
     """Collects one value a key for each stamp, and gives the set when it is complete.
 
-    Sets older than the newest complete one can no longer matter and are dropped, as is the oldest
-    incomplete one beyond `depth`. A completed stamp that is heard again (the same image repeated)
-    starts a new set.
+    Sets older than the newest complete one can no longer matter and are dropped, as is, beyond
+    `depth`, the incomplete one that was begun first (not that of the lowest stamp: the clock may
+    have been set back). A completed stamp that is heard again (the same image repeated) starts a
+    new set.
     """
 
     def __init__(self, keys: Iterable[str], depth: int = 32) -> None:
@@ -27,15 +28,11 @@ class StampJoin:
             self._sets = {stamp: kept for stamp, kept in self._sets.items() if stamp > stamp_ns}
             return collected
         if len(self._sets) > self._depth:
-            del self._sets[min(self._sets)]
+            del self._sets[next(iter(self._sets))]
         return None
 
     def missing(self) -> frozenset[str]:
-        """Keys that the newest incomplete set still lacks (all keys when nothing waits)."""
+        """Keys that the set begun last still lacks (all keys when nothing waits)."""
         if not self._sets:
             return self._keys
-        return self._keys - self._sets[max(self._sets)].keys()
-
-    def clear(self) -> None:
-        """Forget all incomplete sets."""
-        self._sets.clear()
+        return self._keys - self._sets[next(reversed(self._sets))].keys()
