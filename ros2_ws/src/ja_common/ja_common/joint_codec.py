@@ -51,8 +51,11 @@ class JointCodec:
         return self._from_rig(message, message.position, 'position')
 
     def decode_velocity(self, message: JointState) -> NDArray[np.float64] | None:
-        """Velocity (2,) [rad/s], or None where the message gives none."""
-        if len(message.velocity) == 0:
+        """Velocity (2,) [rad/s], or None where the message gives none.
+
+        joint_state_broadcaster of ros2_control sends NaN where the hardware measures none.
+        """
+        if np.isnan(message.velocity).all():
             return None
         return self._from_rig(message, message.velocity, 'velocity')
 
