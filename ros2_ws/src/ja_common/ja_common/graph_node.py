@@ -27,8 +27,9 @@ Config = TypeVar('Config')
 class GraphNode(Node):
     """A node that outlives bad input, reports its health at 1 Hz and says what it misses.
 
-    Callbacks may raise ValueError with one clear sentence for input that cannot be used: it is
-    logged with the topic's name (news only), shown in /diagnostics, and the node lives on.
+    Callbacks may raise ValueError with one clear sentence for input that cannot be used (or
+    OSError for a file): it is logged with the topic's name (news only), shown in /diagnostics, and
+    the node lives on.
     """
 
     def __init__(self, name: str, **node_kwargs: Any) -> None:
@@ -66,7 +67,7 @@ class GraphNode(Node):
             self.health.heard(resolved, time.monotonic())
             try:
                 callback(message)
-            except ValueError as error:
+            except (ValueError, OSError) as error:
                 self.problem(resolved, f'{resolved}: {error}')
             except Exception as error:
                 # Not input but a fault of ours: the node lives on, and the trace is kept.
@@ -86,14 +87,18 @@ class GraphNode(Node):
         self.health.expect(resolved, expected_every_s)
 
     def offer(self, service_type: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
-        """A service; a ValueError or OSError of the callback is answered as `success = False`."""
+        """A service; an error of the callback is answered as `success = False` with its text."""
 
         def guarded(request: Any, response: Any) -> Any:
             try:
                 return callback(request, response)
             except (ValueError, OSError) as error:
-                response.success, response.message = False, str(error)
-                return response
+                text = str(error)
+            except Exception as error:
+                text = f'{type(error).__name__}: {error}'
+                self.problem(name, f'{name}: {text}\n{traceback.format_exc()}')
+            response.success, response.message = False, text
+            return response
 
         self.create_service(service_type, name, guarded)
 
@@ -157,7 +162,7 @@ def spin_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) 
     apply_ros_defaults()
     node = None
     try:
-        rclpy.init(args=args)
+        _init(args)
         node = make_node()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
@@ -175,3 +180,11 @@ def spin_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) 
             rclpy.try_shutdown()
         except KeyboardInterrupt:
             pass
+
+
+def _init(args: Sequence[str] | None) -> None:
+    try:
+        rclpy.init(args=args)
+    except RuntimeError as error:
+        # An unknown argument, or a parameter file that is missing or no YAML.
+        raise ConfigError(f'ROS arguments cannot be used: {error}') from None

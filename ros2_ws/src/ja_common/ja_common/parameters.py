@@ -10,6 +10,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rclpy.exceptions import InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -31,15 +32,15 @@ def declare_config(
     """
     config_fields = {f.name: f for f in fields(config_class)}  # type: ignore[arg-type]
     values = {}
-    for name, config_field in config_fields.items():
-        declared = node.declare_parameter(
-            name, config_field.default, _descriptor(config_field, read_only=changed is None)
-        )
-        try:
+    try:
+        for name, config_field in config_fields.items():
+            declared = node.declare_parameter(
+                name, config_field.default, _descriptor(config_field, read_only=changed is None)
+            )
             values[name] = checked(config_field, declared.value)
-        except ConfigError as error:
-            raise ConfigError(f'{node.get_fully_qualified_name()}: parameter {error}') from None
-    config = config_class(**values)
+        config = config_class(**values)
+    except (ConfigError, InvalidParameterValueException) as error:
+        raise ConfigError(f'{node.get_fully_qualified_name()}: parameters: {error}') from None
     if changed is None:
         return config
 
@@ -55,7 +56,7 @@ def declare_config(
         try:
             updated(parameters)
         except (ConfigError, ValueError) as error:
-            return SetParametersResult(successful=False, reason=f'parameter {error}')
+            return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def apply(parameters: list[Parameter]) -> None:
