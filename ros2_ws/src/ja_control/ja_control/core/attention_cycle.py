@@ -119,9 +119,12 @@ class AttentionCycle:
         self._begin(Phase.HOME)
 
     def restart(self) -> None:
-        """Give up what is under way (after a hold or a jump of the clock) and look again."""
+        """Give up what is under way (after a hold or a jump of the clock) and look again.
+
+        Only the order to turn home outlives it.
+        """
         self._target = None
-        self._begin(Phase.LOOK)
+        self._begin(Phase.HOME if self.phase is Phase.HOME else Phase.LOOK)
 
     def step(self, percept: Percept) -> Decision:
         """One image: advance the cycle, and say which posture to take."""
@@ -143,6 +146,7 @@ class AttentionCycle:
         self._source = Source.NONE
         self._shifts = 0
         self._since_ns: int | None = None
+        self._face_in_view = True
 
     def _elapsed_s(self, percept: Percept) -> float:
         if self._since_ns is None:
@@ -151,6 +155,10 @@ class AttentionCycle:
 
     def _look(self, percept: Percept) -> None:
         face = percept.face_delta
+        if self._face_in_view is not (face is not None):
+            # Dwelling on the face and missing it are two waits; each starts anew.
+            self._face_in_view = face is not None
+            self._since_ns = None
         if face is None:
             self._look_where_the_face_was(percept)
             return
