@@ -26,6 +26,7 @@ from ja_common.topics import (
     FIXATION,
     GATE_STATUS,
     JOINT_COMMANDS,
+    JOINT_STATES,
     LM_DELTA,
     VF_DELTA,
     Topic,
@@ -73,7 +74,7 @@ class GateNode(GraphNode):
         self._join = StampJoin([topic.name for topic in _PROPOSALS])
         self._last_stamp_ns = 0
         self._last_command: JointState | None = None
-        self._commanded: np.ndarray | None = None
+        self._commanded = np.full(2, np.nan)
         self._heard_all_s = time.monotonic()
         self._holding = ''
 
@@ -106,22 +107,23 @@ class GateNode(GraphNode):
     def _act(self, header: Header, proposals: dict[str, Any], posture: Posture) -> None:
         self._heard_all_s = time.monotonic()
         stamp_ns = posture.stamp_ns
-        if stamp_ns == self._last_stamp_ns and self._last_command is not None:
+        if stamp_ns == self._last_stamp_ns and self._last_command is not None and not self._holding:
             # The same image again (a sim that lost the answer): the same answer again.
             self._commands.publish(self._last_command)
             return
         seconds = (stamp_ns - self._last_stamp_ns) / NS_PER_S
         if -1.0 < seconds < 0.0:
             return  # late: a newer image has been answered already
-        if seconds <= -1.0 or self._holding or self._commanded is None:
-            # The clock was set back, or the head was held: start from where it stands.
-            self._cycle.restart()
-            self._commanded = posture.position
-            seconds = 0.0 if self._last_command is None else min(max(seconds, 0.0), 0.1)
-        self._holding = self._reason_to_hold(stamp_ns)
-        if self._holding:
-            self._hold(header, posture.position)
+        reason = self._reason_to_hold(stamp_ns)
+        if reason:
+            self._hold(header, reason)
         else:
+            if seconds < 0.0 or self._holding or self._last_command is None:
+                # The clock was set back, or the head was held: start from where it stands.
+                self._cycle.restart()
+                self._commanded = self._where_it_stands()
+                seconds = 0.0
+            self._holding = ''
             percept = Percept(
                 posture,
                 face_delta=proposals[FACE_DELTA.name],
@@ -129,6 +131,8 @@ class GateNode(GraphNode):
                 lm_delta=proposals[LM_DELTA.name],
                 fixation=proposals[FIXATION.name],
             )
+            # A clock set forward is no time in which the head could have turned.
+            seconds = min(seconds, self._config.stale_after_s)
             self._command(header, self._cycle.step(percept), seconds)
         self._last_stamp_ns = stamp_ns
 
@@ -145,9 +149,17 @@ class GateNode(GraphNode):
         self._publish(header, limited.posture)
         self._tell(Level.OK, decision.phase.value, decision, clamped=limited.clamped)
 
-    def _hold(self, header: Header, posture: np.ndarray) -> None:
-        self._publish(header, self._limits.clip(posture))
-        self._tell(Level.WARN, f'hold: {self._holding}', None, reason=self._holding)
+    def _hold(self, header: Header, reason: str) -> None:
+        posture = self._commanded if self._holding else self._where_it_stands()
+        self._holding = reason
+        self._publish(header, posture)
+        self._tell(Level.WARN, f'hold: {reason}', None, reason=reason)
+
+    def _where_it_stands(self) -> np.ndarray:
+        # Now, not at the image's stamp: an image may be old, and so would be its posture.
+        newest = self._postures.newest
+        assert newest is not None, 'nothing is commanded before a joint state has come'
+        return self._limits.clip(newest.position)
 
     def _publish(self, header: Header, posture: np.ndarray) -> None:
         self._commanded = posture
@@ -176,13 +188,12 @@ class GateNode(GraphNode):
         silent_s = time.monotonic() - self._heard_all_s
         if silent_s < self._config.stale_after_s or self._holding:
             return
-        newest = self._postures.newest
-        if newest is None or self._last_command is None:
+        if self._last_command is None:
             return  # nothing was ever commanded
-        missing = ', '.join(sorted(self._join.missing()))
-        self._holding = f'no {missing} for {silent_s:.1f} s'
-        self.problem('hold', f'holding the head where it is: {self._holding}', Level.WARN)
-        self._hold(Header(stamp=self.get_clock().now().to_msg()), newest.position)
+        missing = [JOINT_STATES.name] if self._postures.is_behind else self._join.missing()
+        reason = f'no {", ".join(sorted(missing))} for {silent_s:.1f} s'
+        self.problem('hold', f'holding the head where it is: {reason}', Level.WARN)
+        self._hold(Header(stamp=self.get_clock().now().to_msg()), reason)
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> Any:
         self._enabled = request.data
@@ -191,6 +202,8 @@ class GateNode(GraphNode):
         return response
 
     def _on_home(self, _: Trigger.Request, response: Trigger.Response) -> Any:
+        if not self._enabled:
+            raise ValueError('the gate is disabled: call enable first')
         self._cycle.go_home()
         response.success, response.message = True, 'turning to the home posture'
         return response
