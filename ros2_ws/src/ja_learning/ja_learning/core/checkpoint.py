@@ -42,14 +42,18 @@ def load_checkpoint(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]
 
     Raises FileNotFoundError, or ValueError when the file is damaged or not a checkpoint.
     """
+    if not path.exists():
+        raise FileNotFoundError(f'no checkpoint at {path}')
+    if not zipfile.is_zipfile(path):
+        raise ValueError(f'{path} is not a checkpoint, or was cut short: it is no .npz file')
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         description = json.loads(str(arrays.pop('description')))
-    except FileNotFoundError:
-        raise FileNotFoundError(f'no checkpoint at {path}') from None
-    except (KeyError, ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        found = description['format']
+    except Exception as error:
+        # A damaged file shows in a dozen kinds of error from zipfile, numpy and json.
         raise ValueError(f'{path} is not a readable checkpoint: {error}') from None
-    if description.get('format') != FORMAT:
-        raise ValueError(f'{path} has format {description.get("format")!r}, not {FORMAT!r}')
+    if found != FORMAT:
+        raise ValueError(f'{path} has format {found!r}, not {FORMAT!r}')
     return arrays, description

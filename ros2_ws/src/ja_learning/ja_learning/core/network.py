@@ -98,11 +98,15 @@ class ThreeLayerNetwork:
         return arrays
 
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
-        """Take up the state of `state()`. Raises ValueError if it is another network's."""
-        for name, p in self._parameters.items():
-            if name not in arrays or arrays[name].shape != tuple(p.shape):
-                found = arrays[name].shape if name in arrays else 'nothing'
-                raise ValueError(f'{name} must have shape {tuple(p.shape)}, found {found}')
+        """Take up the state of `state()`.
+
+        Raises ValueError, and changes nothing, if it is another network's or not finite.
+        """
+        wanted = {name: tuple(p.shape) for name, p in self._parameters.items()} | {'trials': ()}
+        for name, shape in wanted.items():
+            _check_array(name, arrays.get(name), shape)
+            if f'momentum_{name}' in arrays:
+                _check_array(f'momentum_{name}', arrays[f'momentum_{name}'], shape)
         for name, p in self._parameters.items():
             p.data.copy_(torch.from_numpy(arrays[name]))
             momentum = arrays.get(f'momentum_{name}')
@@ -126,3 +130,11 @@ class ThreeLayerNetwork:
         return torch.from_numpy(
             np.hstack([pixels, postures / self.config.angle_scale_rad]).astype(np.float32)
         )
+
+
+def _check_array(name: str, array: NDArray[Any] | None, shape: tuple[int, ...]) -> None:
+    if array is None or array.shape != shape or array.dtype.kind not in 'fiu':
+        found = 'nothing' if array is None else f'{array.dtype} of shape {array.shape}'
+        raise ValueError(f'{name} must be numbers of shape {shape}, found {found}')
+    if not np.isfinite(array).all():
+        raise ValueError(f'{name} holds numbers that are not finite')
