@@ -60,12 +60,15 @@ class TrialRecorder:
             self._postures.append(np.array(posture, float))
 
     def fixate(self, posture: ArrayLike, direction: ArrayLike) -> Trial | None:
-        """An object in this direction is fixated from this posture: the trial, if one was open."""
-        if self._face is None:
-            return None
+        """An object in this direction is fixated from this posture: the trial, if one was open.
+
+        What stands in the centre while the head has not yet left the caregiver ends nothing.
+        """
         began = self._postures
-        if len(began) > 1 and self._same(posture, began[-1]):
+        if began and self._same(posture, began[-1]):
             began = began[:-1]  # where the last shift ended, none began
+        if self._face is None or not began:
+            return None
         trial = Trial(self._face, np.array(began), np.array(direction, float))
         self.forget()
         return trial
