@@ -107,7 +107,8 @@ class GateNode(GraphNode):
     def _act(self, header: Header, proposals: dict[str, Any], posture: Posture) -> None:
         self._heard_all_s = time.monotonic()
         stamp_ns = posture.stamp_ns
-        if stamp_ns == self._last_stamp_ns and self._last_command is not None and not self._holding:
+        answered = self._last_command is not None and stamp_ns == self._last_stamp_ns
+        if answered and not self._holding:
             # The same image again (a sim that lost the answer): the same answer again.
             self._commands.publish(self._last_command)
             return

@@ -49,13 +49,13 @@ def check(config: Any) -> None:
 
 
 def _converted(name: str, wanted: type, value: Any) -> Any:
-    if wanted is float and isinstance(value, int) and not isinstance(value, bool):
+    if wanted is float and type(value) is int:
         value = float(value)
     if type(value) is not wanted:
         raise ConfigError(
             f'{name} = {value!r} is a {type(value).__name__}; a {wanted.__name__} is needed'
         )
-    if wanted is float and not math.isfinite(value):
+    if isinstance(value, float) and not math.isfinite(value):
         raise ConfigError(f'{name} = {value!r} is not a finite number')
     return value
 

@@ -197,9 +197,9 @@ class AttentionCycle:
         # One draw a shift, whether or not the learner has an answer: the same seed gives the
         # same sequence of sources.
         learner_drawn = self._rng.random() < self.gating.p_lm(self.trials)
-        if learner_drawn and percept.lm_delta is not None:
-            self._source, delta = Source.LEARNING_MODULE, percept.lm_delta
-        else:
+        delta = percept.lm_delta if learner_drawn else None
+        self._source = Source.LEARNING_MODULE
+        if delta is None:
             self._source, delta = Source.VISUAL_FEEDBACK, percept.vf_delta
         here = percept.posture.position
         self._target = here if delta is None else here + delta

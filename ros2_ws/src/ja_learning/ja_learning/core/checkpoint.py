@@ -21,10 +21,11 @@ def save_checkpoint(
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     text = json.dumps({'format': FORMAT, **description})
+    contents: dict[str, Any] = {**arrays, 'description': np.array(text)}
     temporary = path.with_name(f'.{path.name}.{os.getpid()}')
     try:
         with open(temporary, 'wb') as file:
-            np.savez(file, description=np.array(text), **arrays)
+            np.savez(file, **contents)
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, path)

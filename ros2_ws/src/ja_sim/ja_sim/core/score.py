@@ -7,7 +7,7 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from ja_common.core.geometry import angle_between
@@ -72,7 +72,7 @@ class Score:
         self._recent: deque[bool] = deque(maxlen=window)
         self._rates: dict[str, Rate] = {}
 
-    def see(self, truth: TruthAt, fixation: ArrayLike | None) -> Outcome | None:
+    def see(self, truth: TruthAt, fixation: NDArray[np.float64] | None) -> Outcome | None:
         """One image: the truth and the fixation (2,) [rad] at its stamp; what just ended, if any.
 
         A trial ends when the next begins. What happens before the first look belongs to none, and
@@ -86,7 +86,7 @@ class Score:
         self._truth = truth
         if fixation is not None and self._fixated is None and truth.trial > 0:
             nearest = int(np.argmin(angle_between(truth.directions, fixation)))
-            self._fixated = (float(fixation[0]), float(fixation[1]))  # type: ignore[index]
+            self._fixated = (float(fixation[0]), float(fixation[1]))
             self._success = nearest == truth.attended
         return ended
 
