@@ -35,7 +35,10 @@ class GraphNode(Node):
     def __init__(self, name: str, **node_kwargs: Any) -> None:
         super().__init__(name, **node_kwargs)
         self.health = Health(time.monotonic())
-        self._heard_topics: dict[str, Topic] = {}
+        # By resolved name; `./ja reference` makes the tables of docs/ from these.
+        self.heard_topics: dict[str, Topic] = {}
+        self.said_topics: dict[str, Topic] = {}
+        self.offered_services: dict[str, Any] = {}
         self._diagnostics = self.say(DIAGNOSTICS)
         # Wall time, not /clock: a simulation that stands still must be reported as well.
         self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -48,12 +51,14 @@ class GraphNode(Node):
 
     def say(self, topic: Topic) -> Publisher:
         """A publisher of a topic."""
-        return self.create_publisher(
+        publisher = self.create_publisher(
             topic.type,
             topic.name,
             topic.says,
             event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
         )
+        self.said_topics[publisher.topic_name] = topic
+        return publisher
 
     def hear(
         self,
@@ -83,7 +88,7 @@ class GraphNode(Node):
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
         resolved = subscription.topic_name
-        self._heard_topics[resolved] = topic
+        self.heard_topics[resolved] = topic
         self.health.expect(resolved, expected_every_s)
 
     def offer(self, service_type: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
@@ -100,7 +105,8 @@ class GraphNode(Node):
             response.success, response.message = False, text
             return response
 
-        self.create_service(service_type, name, guarded)
+        service = self.create_service(service_type, name, guarded)
+        self.offered_services[service.srv_name] = service_type
 
     def problem(self, where: str, message: str, level: Level = Level.ERROR) -> None:
         """Something is wrong: into /diagnostics, and into the log when it is news."""
@@ -113,7 +119,7 @@ class GraphNode(Node):
 
     def _report(self) -> None:
         silent = self.health.silent(time.monotonic())
-        for name in self._heard_topics:
+        for name in self.heard_topics:
             where = f'silence of {name}'
             if name in silent:
                 text = f'no message on {name} for more than {silent[name]:g} s: '
@@ -136,7 +142,7 @@ class GraphNode(Node):
         publishers = self.get_publishers_info_by_topic(name)
         if not publishers:
             return 'nobody publishes it'
-        hears = self._heard_topics[name].hears
+        hears = self.heard_topics[name].hears
         for publisher in publishers:
             offered = publisher.qos_profile
             if (

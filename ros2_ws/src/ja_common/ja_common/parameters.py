@@ -18,7 +18,8 @@ from ja_common.core.config import ConfigError, checked
 
 Config = TypeVar('Config')
 
-_FAR = 1e9
+UNBOUNDED = 1e9
+"""Stands in a descriptor for an end that a range does not have."""
 
 
 def declare_config(
@@ -81,7 +82,7 @@ def _descriptor(config_field: Any, read_only: bool) -> ParameterDescriptor:
         name=config_field.name, description=text, dynamic_typing=True, read_only=read_only
     )
     if low is not None or high is not None:
-        bounds = (-_FAR if low is None else low, _FAR if high is None else high)
+        bounds = (-UNBOUNDED if low is None else low, UNBOUNDED if high is None else high)
         if isinstance(config_field.default, float):
             descriptor.floating_point_range = [
                 FloatingPointRange(from_value=float(bounds[0]), to_value=float(bounds[1]))

@@ -12,7 +12,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from ja_common.core.config import parameter
 from ja_common.core.detection import caregiver_face
-from ja_common.core.posture import Posture
+from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_common.core.stamp_join import StampJoin
 from ja_common.detection_codec import decode_detections
 from ja_common.graph_node import GraphNode, spin_node
@@ -37,7 +37,7 @@ class LearningModuleConfig:
         0, 'save after so many learned trials; 0: only when asked', low=0
     )
     still_below_rad_s: float = parameter(
-        0.05, 'a joint slower than this stands still', low=1e-4, high=5.0
+        STILL_BELOW_RAD_S, 'a joint slower than this stands still', low=1e-4, high=5.0
     )
 
 

@@ -12,6 +12,9 @@ from ja_common.core.stamps import NS_PER_S
 
 Item = TypeVar('Item')
 
+STILL_BELOW_RAD_S = 0.05
+"""Speed [rad/s] below which a joint stands still, unless a node is told another."""
+
 
 @dataclass(frozen=True)
 class Posture:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ja_common.core.config import parameter
-from ja_common.core.posture import Posture
+from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_common.core.stamps import NS_PER_S
 from ja_control.core.gating import Gating
 
@@ -47,7 +47,7 @@ class AttentionCycleConfig:
         0.03, 'the face is centred when it is nearer to the centre than this', low=1e-3, high=0.5
     )
     still_below_rad_s: float = parameter(
-        0.05, 'a joint slower than this stands still', low=1e-4, high=5.0
+        STILL_BELOW_RAD_S, 'a joint slower than this stands still', low=1e-4, high=5.0
     )
     arrived_within_rad: float = parameter(
         0.02, 'a shift has arrived when the head stands still this near to its aim',

@@ -12,7 +12,7 @@ from ja_common.core.config import parameter
 from ja_common.core.detection import Detection, Kind, objects
 from ja_common.core.fixation import WIDTH_SIXTH, nearest_to_centre
 from ja_common.core.geometry import directions_of_rays
-from ja_common.core.posture import Posture
+from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class EvaluatorConfig:
         choices=('nearest', 'most_salient'),
     )
     still_below_rad_s: float = parameter(
-        0.05, 'a joint slower than this stands still', low=1e-4, high=5.0
+        STILL_BELOW_RAD_S, 'a joint slower than this stands still', low=1e-4, high=5.0
     )
 
 

@@ -1,0 +1,152 @@
+"""The reference pages docs/topics.md and docs/parameters.md, made from the running code.
+
+Every node is started once in a private context, and asked what it hears, says, offers and takes.
+"""
+
+from collections import defaultdict
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import cv2
+import numpy as np
+import rclpy
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.context import Context
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+
+from ja_bringup.graph import NodeSpec
+from ja_common.graph_node import GraphNode
+from ja_common.parameters import UNBOUNDED
+from ja_common.topics import TOPICS
+
+NODES = (
+    NodeSpec('ja_perception', 'camera'),
+    NodeSpec('ja_perception', 'salient_feature_detector'),
+    NodeSpec('ja_control', 'visual_feedback_controller'),
+    NodeSpec('ja_learning', 'internal_evaluator'),
+    NodeSpec('ja_learning', 'learning_module'),
+    NodeSpec('ja_control', 'gate'),
+    NodeSpec('ja_sim', 'sim'),
+    NodeSpec('ja_sim', 'scorer'),
+    NodeSpec('ja_sim', 'digital_head'),
+)
+# What rclpy declares by itself on every node.
+_NOT_OURS = ('use_sim_time', 'start_type_description_service')
+
+_TOPICS_HEAD = """# Topics and services
+
+Made by `./ja reference` from the code; do not edit. All names are relative (namespaces and remaps
+work) but `/clock` and `/diagnostics`. The stamp of an image goes unchanged through everything that
+follows from it. Every image gets one message on each topic of the loop, an empty one where there
+is nothing to say.
+
+| topic | type | said by | heard by | quality of service (said / heard) | what it is |
+|---|---|---|---|---|---|
+"""
+_SERVICES_HEAD = """
+| service | type | offered by |
+|---|---|---|
+"""
+_PARAMETERS_HEAD = """# Parameters
+
+Made by `./ja reference` from the code; do not edit. A whole number is accepted for a float. A bad
+value is refused with the reason and changes nothing; *fixed* parameters are read at the start.
+"""
+
+
+def write_reference(folder: Path) -> list[Path]:
+    """Write both pages into a folder; their paths."""
+    context = Context()
+    rclpy.init(args=[], context=context)
+    with TemporaryDirectory() as pictures:
+        # The camera wants something to show.
+        cv2.imwrite(f'{pictures}/grey.png', np.full((48, 64, 3), 128, np.uint8))
+        overrides = {'camera': [Parameter('source', value=pictures)]}
+        nodes: list[GraphNode] = []
+        try:
+            for spec in NODES:
+                own = overrides.get(spec.thing, [])
+                nodes.append(spec.load()(context=context, parameter_overrides=own))
+            pages = {'topics.md': topics_page(nodes), 'parameters.md': parameters_page(nodes)}
+        finally:
+            for node in nodes:
+                node.destroy_node()
+            context.try_shutdown()
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in pages.items():
+        (folder / name).write_text(text, encoding='utf-8')
+    return [folder / name for name in pages]
+
+
+def topics_page(nodes: list[GraphNode]) -> str:
+    """The table of topics and services, in Markdown."""
+    says, hears = defaultdict(list), defaultdict(list)
+    services: dict[str, tuple[type, list[str]]] = {}
+    for node in nodes:
+        for topic in node.said_topics.values():
+            says[topic.name].append(node.get_name())
+        for topic in node.heard_topics.values():
+            hears[topic.name].append(node.get_name())
+        for name, service in node.offered_services.items():
+            services.setdefault(name.lstrip('/'), (service, []))[1].append(node.get_name())
+    rows = [
+        f'| `{topic.name}` | {_type_name(topic.type)} | {_names(says[topic.name], nodes)} '
+        f'| {_names(hears[topic.name], nodes)} | {_qos(topic.says)} / {_qos(topic.hears)} '
+        f'| {topic.purpose} |\n'
+        for topic in TOPICS
+    ]
+    service_rows = [
+        f'| `{name}` | {_type_name(service)} | {_names(offered, nodes)} |\n'
+        for name, (service, offered) in sorted(services.items())
+    ]
+    return _TOPICS_HEAD + ''.join(rows) + _SERVICES_HEAD + ''.join(service_rows)
+
+
+def parameters_page(nodes: list[GraphNode]) -> str:
+    """The tables of parameters, one a node, in Markdown."""
+    sections = []
+    for node in nodes:
+        head = f'\n## {node.get_name()}\n\n| parameter | default | range | what it is |\n'
+        rows = []
+        for name in sorted(node._parameters):
+            if name.startswith(_NOT_OURS) or name.startswith('qos_overrides'):
+                continue
+            descriptor = node.describe_parameter(name)
+            shown = _default(node, name)
+            text = descriptor.description + (' (*fixed*)' if descriptor.read_only else '')
+            rows.append(f'| `{name}` | `{shown}` | {_range(descriptor)} | {text} |\n')
+        sections.append(head + '|---|---|---|---|\n' + ''.join(rows))
+    return _PARAMETERS_HEAD + ''.join(sections)
+
+
+def _type_name(kind: type) -> str:
+    package, _, *_ = kind.__module__.split('.')
+    return f'{package}/{kind.__name__}'
+
+
+def _names(names: list[str], nodes: list[GraphNode]) -> str:
+    if len(names) == len(nodes):
+        return 'every node'
+    return ', '.join(f'`{name}`' for name in names) or '-'
+
+
+def _qos(profile: QoSProfile) -> str:
+    text = f'{profile.reliability.name.lower().replace("_", " ")}, depth {profile.depth}'
+    return text + (', latched' if 'LOCAL' in profile.durability.name else '')
+
+
+def _default(node: GraphNode, name: str) -> str:
+    if any(p.name == name for p in node._parameter_overrides.values()):
+        return '(must be given)'
+    value = node.get_parameter(name).value
+    return repr(round(value, 6)) if isinstance(value, float) else repr(value)
+
+
+def _range(descriptor: ParameterDescriptor) -> str:
+    for bounds in (*descriptor.floating_point_range, *descriptor.integer_range):
+        low, high = bounds.from_value, bounds.to_value
+        if high >= UNBOUNDED:
+            return f'from {low:g}'
+        return f'up to {high:g}' if low <= -UNBOUNDED else f'{low:g} to {high:g}'
+    return ''
