@@ -59,6 +59,10 @@ class AttentionCycleConfig:
     max_shifts: int = parameter(
         5, 'shifts after which a trial without fixation is given up', low=1, high=100
     )
+    source_drawn: str = parameter(
+        'every_shift', 'when the gate draws between VF and LM: at every shift, or once a trial',
+        choices=('every_shift', 'first_shift'),
+    )  # fmt: skip
     search_after_s: float = parameter(
         1.0, 'time without a face, looking where it was, before searching', low=0.0, high=60.0
     )
@@ -111,6 +115,7 @@ class AttentionCycle:
         self.trials = 0
         self._caregiver: NDArray[np.float64] | None = None
         self._target: NDArray[np.float64] | None = None
+        self._learner_drawn = False
         self._begin(Phase.LOOK)
 
     def go_home(self) -> None:

@@ -33,6 +33,9 @@ class NetworkConfig:
         'pixels as fractions of white minus a half, or standardised to mean 0 and deviation 1',
         choices=('centred', 'standardised'),
     )
+    posture_input: bool = parameter(
+        True, 'give the network the posture; without it, the face alone must do'
+    )
     initial_weight: float = parameter(
         0.05, 'weights start uniformly within +- this', low=0.0, high=10.0
     )
@@ -123,13 +126,20 @@ class ThreeLayerNetwork:
         return torch.nn.functional.linear(hidden, p['output_weights'], p['output_biases'])
 
     def _inputs(self, face: NDArray[Any], postures: NDArray[np.float64]) -> torch.Tensor:
-        pixels = face.ravel() / 255.0 - 0.5
-        if self.config.face_scaling == 'standardised':
-            pixels = (pixels - pixels.mean()) / max(float(pixels.std()), 1e-3)
+        pixels = face_inputs(face, self.config.face_scaling)
+        angles = postures / self.config.angle_scale_rad * self.config.posture_input
         pixels = np.broadcast_to(pixels, (len(postures), face.size))
-        return torch.from_numpy(
-            np.hstack([pixels, postures / self.config.angle_scale_rad]).astype(np.float32)
-        )
+        return torch.from_numpy(np.hstack([pixels, angles]).astype(np.float32))
+
+
+def face_inputs(faces: ArrayLike, scaling: str) -> NDArray[np.float64]:
+    """Faces, uint8 (..., 30, 25), as inputs (..., 750); `scaling` as in `NetworkConfig`."""
+    faces = np.asarray(faces)
+    pixels = faces.reshape(*faces.shape[:-2], -1) / 255.0 - 0.5
+    if scaling == 'standardised':
+        spread = np.maximum(pixels.std(axis=-1, keepdims=True), 1e-3)
+        pixels = (pixels - pixels.mean(axis=-1, keepdims=True)) / spread
+    return pixels
 
 
 def _check_array(name: str, array: NDArray[Any] | None, shape: tuple[int, ...]) -> None:
