@@ -27,7 +27,18 @@ def main() -> None:
     if PARENT in os.environ:
         end_with_parent(int(os.environ[PARENT]))
     sys.argv = [module, *sys.argv[2:]]
-    importlib.import_module(module).main()
+    node = importlib.import_module(module)
+    try:
+        # The supervisor starts us with SIGINT blocked: in the middle of an import it would end
+        # in a traceback. One that came meanwhile is delivered here.
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        node.main()
+    except KeyboardInterrupt:
+        pass
+    except RuntimeError as error:
+        # Asked to stop while the node was being made: rclpy has shut its context down under it.
+        if 'context is' not in str(error):
+            raise
 
 
 if __name__ == '__main__':

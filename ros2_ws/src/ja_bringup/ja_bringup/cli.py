@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ja_bringup.graph import rig_graph, sim_graph, split_ros_arguments, with_arguments
+from ja_common.core.config import ConfigError
 from ja_common.ros_defaults import apply_ros_defaults
 
 app = typer.Typer(
@@ -95,7 +96,10 @@ def main() -> None:
     """Split ROS's arguments off, as rclpy does, and run the command."""
     apply_ros_defaults()
     ours, ros = split_ros_arguments(sys.argv[1:])
-    app(args=ours, obj=ros, prog_name='ja')
+    try:
+        app(args=ours, obj=ros, prog_name='ja')
+    except ConfigError as error:
+        sys.exit(f'error: {error}')
 
 
 if __name__ == '__main__':

@@ -7,11 +7,13 @@ from pathlib import Path
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation as implementation
 
 from ja_bringup.graph import NodeSpec
 from ja_bringup.one_process import run_in_one_process
 from ja_bringup.progress import Display, ProgressNode
 from ja_bringup.supervisor import OnDeath, Supervisor
+from ja_common.core.config import ConfigError
 from ja_common.ros_defaults import apply_ros_defaults
 
 
@@ -20,6 +22,24 @@ def new_run_folder(name: str, parent: Path = Path('runs')) -> Path:
     folder = parent / f'{time.strftime("%Y%m%d-%H%M%S")}-{name}'
     folder.mkdir(parents=True, exist_ok=True)
     return folder
+
+
+def check_ros_arguments(arguments: Sequence[str]) -> None:
+    """Raises ConfigError with one sentence for arguments that no node would understand."""
+    context = Context()
+    try:
+        rclpy.init(
+            args=['--ros-args', *arguments],
+            context=context,
+            signal_handler_options=rclpy.SignalHandlerOptions.NO,
+        )
+    except implementation.UnknownROSArgsError as error:
+        raise ConfigError(f'unknown ROS arguments: {error}') from None
+    except implementation.RCLError as error:
+        # "failed to initialize rcl: WHAT, at FILE:LINE, at ..."
+        what = str(error).removeprefix('failed to initialize rcl: ').split(', at ')[0]
+        raise ConfigError(f'ROS arguments: {what}') from None
+    context.try_shutdown()
 
 
 def run_graph(
@@ -37,6 +57,7 @@ def run_graph(
     `arguments`: the ROS arguments that all nodes get (a namespace is the watcher's as well).
     """
     apply_ros_defaults()
+    check_ros_arguments(arguments)
     watcher: list[ProgressNode] = []
 
     def make_watcher(context: Context) -> ProgressNode:

@@ -4,7 +4,8 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -39,6 +40,16 @@ class Death:
         return f'{self.node} {how}{said}'
 
 
+@contextmanager
+def _blocked(number: signal.Signals) -> Iterator[None]:
+    """Hold a signal back; children that are started meanwhile inherit that (see `child`)."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {number})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 class _Process:
     """One node's process and its log; the log is a file, so nothing blocks when we are slow."""
 
@@ -58,7 +69,7 @@ class _Process:
             **self.spec.environ,
             PARENT: str(os.getpid()),
         }
-        with self._log.open('ab') as log:
+        with self._log.open('ab') as log, _blocked(signal.SIGINT):
             self._starts_at = log.tell()
             # A session of its own: Ctrl-C reaches the supervisor alone, which ends all in order.
             self.popen = subprocess.Popen(

@@ -1,0 +1,108 @@
+"""Who may import whom, and who may know the truth."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from ja_bringup.graph import rig_graph, sim_graph
+
+SOURCES = Path(__file__).parents[2] / 'ros2_ws' / 'src'
+MIDDLE = {'ja_perception', 'ja_control', 'ja_learning', 'ja_sim'}
+MAY_IMPORT = {
+    'ja_common': set(),
+    **{package: {'ja_common'} for package in MIDDLE},
+    'ja_experiments': {'ja_common', *MIDDLE},
+    'ja_bringup': {'ja_common', 'ja_experiments', *MIDDLE},
+}
+OURS = set(MAY_IMPORT)
+
+
+def imported(path: Path) -> set[str]:
+    """Full names of all that a file imports, wherever in the file."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names |= {node.module, *(f'{node.module}.{alias.name}' for alias in node.names)}
+    return names
+
+
+def test_every_package_has_its_room():
+    assert {path.name for path in SOURCES.iterdir() if path.is_dir()} == OURS
+
+
+def imports_of(package: str) -> Iterator[tuple[Path, str]]:
+    """Every import of a package: the file (relative to ros2_ws/src) and the full name."""
+    for path in sorted((SOURCES / package / package).rglob('*.py')):
+        for name in sorted(imported(path)):
+            yield path.relative_to(SOURCES), name
+
+
+@pytest.mark.parametrize('package', sorted(OURS))
+def test_imports_run_downward(package):
+    wrong = [
+        (path, name)
+        for path, name in imports_of(package)
+        if (top := name.split('.')[0]) in OURS - {package} and top not in MAY_IMPORT[package]
+    ]
+    assert not wrong
+
+
+@pytest.mark.parametrize('package', sorted(OURS))
+def test_core_is_free_of_ros(package):
+    """Neither rclpy nor messages, and of our packages only their core."""
+    wrong = []
+    for path, name in imports_of(package):
+        top, *rest = name.split('.')
+        if 'core' in path.parts and (
+            top == 'rclpy'
+            or top.endswith('_msgs')
+            or (top in OURS and rest and rest[0] != 'core')
+        ):
+            wrong.append((path, name))
+    assert not wrong
+
+
+@pytest.mark.parametrize('package', sorted(OURS))
+def test_nobody_imports_a_node(package):
+    wrong = [
+        (path, name)
+        for path, name in imports_of(package)
+        if name.split('.')[0] in OURS and name.endswith('_node')
+        and not name.startswith('ja_common.graph_node')
+    ]  # fmt: skip
+    assert not wrong
+
+
+@pytest.mark.parametrize('package', ['ja_perception', 'ja_control', 'ja_learning'])
+def test_the_robot_is_never_told(package):
+    telling = ('truth', 'score')
+    wrong = [
+        (path, name)
+        for path, name in imports_of(package)
+        if any(word in name.lower() for word in telling)
+    ]
+    assert not wrong
+
+
+def test_only_the_scorer_hears_the_truth(ros_context):
+    """In the running graph, whatever the code says."""
+    nodes = [
+        spec.load()(context=ros_context, cli_args=spec.ros_arguments())
+        for spec in [*sim_graph(), *rig_graph(str(Path(__file__).parent))]
+        if spec.thing != 'camera'
+    ]
+    hearers = {
+        node.get_name()
+        for node in nodes
+        for topic, _ in node.get_subscriber_names_and_types_by_node(
+            node.get_name(), node.get_namespace()
+        )
+        if topic.startswith('/sim/')
+    }
+    for node in nodes:
+        node.destroy_node()
+    assert hearers == {'scorer'}

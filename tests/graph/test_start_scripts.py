@@ -1,0 +1,115 @@
+"""`./ja demo` and `./ja rig` as people use them: run to the end, interrupted, broken."""
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.usefixtures('domain')
+
+
+def start(folder: Path, *args: str) -> subprocess.Popen:
+    return subprocess.Popen(
+        [sys.executable, '-m', 'ja_bringup.cli', *args],
+        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+
+
+def processes_of(parent: int) -> list[int]:
+    return list(map(int, Path(f'/proc/{parent}/task/{parent}/children').read_text().split()))
+
+
+def named(pids: list[int]) -> dict[str, int]:
+    """Process ids by the module of their node."""
+    return {Path(f'/proc/{pid}/cmdline').read_text().split('\0')[3]: pid for pid in pids}
+
+
+def logs(folder: Path) -> str:
+    return '\n'.join(path.read_text() for path in folder.glob('runs/*/log/*.log'))
+
+
+@pytest.mark.parametrize('composition', [[], ['--one-process']], ids=['many', 'one'])
+def test_the_demo_runs_to_its_end(composition, tmp_path):
+    process = start(tmp_path, 'demo', '--trials', '3', '--time', '60', *composition)
+    output, _ = process.communicate(timeout=90)
+    assert process.returncode == 0, output
+    assert 'Traceback' not in output + logs(tmp_path)
+    assert 'success rate, last trials' in output
+    [curve] = tmp_path.glob('runs/*-demo/success_curve.csv')
+    rows = list(csv.DictReader(curve.open()))
+    assert len(rows) >= 3
+    assert [int(row['trial']) for row in rows] == list(range(1, len(rows) + 1))
+    picture = cv2.imread(str(curve.with_suffix('.png')))
+    assert picture is not None
+    assert picture.std() > 5
+
+
+def wait_for_log(folder: Path, process: subprocess.Popen, timeout_s: float = 30.0) -> list[int]:
+    """Until every node of the graph runs as a process; their ids."""
+    end = time.monotonic() + timeout_s
+    while len(list(folder.glob('runs/*/log/*.log'))) < 7:
+        assert process.poll() is None, process.communicate()[0]
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    return processes_of(process.pid)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_demo_cleanly_even_while_it_starts(number, tmp_path):
+    process = start(tmp_path, 'demo')
+    pids = wait_for_log(tmp_path, process)
+    process.send_signal(number)
+    output, _ = process.communicate(timeout=30)
+    assert process.returncode == 0, output
+    assert 'Traceback' not in output + logs(tmp_path)
+    assert not [pid for pid in pids if Path(f'/proc/{pid}').exists()]
+
+
+def test_a_killed_node_ends_the_demo_with_its_name(tmp_path):
+    process = start(tmp_path, 'demo')
+    pids = wait_for_log(tmp_path, process)
+    os.kill(named(pids)['ja_learning.learning_module_node'], signal.SIGKILL)
+    output, _ = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert 'learning_module was killed by SIGKILL' in output
+    assert 'Traceback' not in output + logs(tmp_path)
+    assert not [pid for pid in pids if Path(f'/proc/{pid}').exists()]
+
+
+def test_a_bad_parameter_file_gives_one_clear_error(tmp_path):
+    bad = tmp_path / 'bad.yaml'
+    bad.write_text('/**:\n  ros__parameters:\n    max_shifts: many\n')
+    process = start(tmp_path, 'demo', '--ros-args', '--params-file', str(bad))
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert '/gate: ' in output
+    assert "max_shifts = 'many' is a str" in output
+    assert 'Traceback' not in output
+
+
+def test_a_missing_parameter_file_is_named(tmp_path):
+    process = start(tmp_path, 'demo', '--ros-args', '--params-file', 'nowhere.yaml')
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert 'nowhere.yaml' in output
+    assert 'Traceback' not in output
+
+
+@pytest.mark.parametrize('composition', [[], ['--one-process']], ids=['many', 'one'])
+def test_the_rig_runs_on_a_folder_of_images(composition, tmp_path):
+    pictures = tmp_path / 'pictures'
+    pictures.mkdir()
+    picture = np.full((480, 640, 3), 90, np.uint8)
+    cv2.circle(picture, (400, 200), 40, (0, 0, 255), -1)
+    cv2.imwrite(str(pictures / 'a.png'), picture)
+    process = start(tmp_path, 'rig', '--source', str(pictures), '--time', '1', *composition)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 0, output
+    assert 'Traceback' not in output + logs(tmp_path)
