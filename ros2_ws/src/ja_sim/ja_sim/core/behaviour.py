@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .scene import CaregiverSpec
+from .specs import CaregiverSpec
 
 ROBOT = -1  # what she attends to when it is no object
 # The robot has left her when it looks this many tolerances away: the same look counts once.

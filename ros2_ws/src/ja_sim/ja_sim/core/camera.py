@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from .scene import HeadSpec
+from .specs import HeadSpec
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """The caregiver's body in the scene: who she is, and how head, eyes and lids stand.
 
-The meshes come from MakeHuman by way of ``tools/make_caregiver_asset.py``; see ``assets/ORIGIN.md``.
+The meshes come from MakeHuman; ``assets/ORIGIN.md`` says how.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from ja_common.core.config import ConfigError
 from ja_common.core.geometry import head_rotation, vectors_of_directions
 
 from .gaze import GazePose
-from .scene import CaregiverSpec, SceneError
+from .specs import CaregiverSpec
 
 SKIN_TONES = (
     (0.96, 0.80, 0.70),
@@ -29,9 +30,13 @@ HAIR_COLOURS = ((0.10, 0.09, 0.09), (0.23, 0.17, 0.14), (0.40, 0.31, 0.24), (0.5
 IRIS_COLOURS = ((0.20, 0.13, 0.09), (0.30, 0.22, 0.14), (0.30, 0.38, 0.40))
 SHIRT_COLOURS = ((0.33, 0.36, 0.40), (0.52, 0.52, 0.50), (0.26, 0.26, 0.28), (0.60, 0.57, 0.52))
 SIDES = ('left', 'right')
+ARM_RADIUS_M, HAND_SIZE_M = 0.035, (0.03, 0.022, 0.045)
+SHOULDER = np.array([0.0, 0.17, -0.14])  # of the left arm, in the rest frame [m]
 _SKIN_FILE = 'caregiver_skin.png'
 _SHOWN, _HIDDEN = 0, 5  # groups of geoms: MuJoCo draws the first three
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
+_CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
+_SHELL = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
 _ELLIPSOID = mujoco.mjtGeom.mjGEOM_ELLIPSOID
 # In radii of the eyeball, along the gaze: the discs lie just above the white.
 _IRIS = {'pos': (0.86, 0.0, 0.0), 'size': (0.17, 0.46, 0.46)}
@@ -59,7 +64,7 @@ def draw_appearance(spec: CaregiverSpec, rng: np.random.Generator) -> Appearance
     """Draw a person: the one that the specification names, or any."""
     people = identities()
     if spec.identity != 'any' and spec.identity not in people:
-        raise SceneError(
+        raise ConfigError(
             f"caregiver: no identity '{spec.identity}': choose any or {', '.join(people)}"
         )
     index = int(rng.integers(len(people)))
@@ -78,7 +83,7 @@ def _asset() -> dict[str, np.ndarray]:
 
 
 class CaregiverBodies:
-    """Her bodies in the compiled scene; ``eyes`` (2, 3) and ``face`` (3,) are in the rest frame."""
+    """Her bodies in the scene; ``eyes`` (2, 3) and ``face`` (3,) are in the rest frame [m]."""
 
     def __init__(self, spec: mujoco.MjSpec, caregiver: CaregiverSpec) -> None:
         direction = np.radians([caregiver.pan_deg, caregiver.tilt_deg])
@@ -89,6 +94,9 @@ class CaregiverBodies:
         torso = spec.worldbody.add_body(name='caregiver_torso', mocap=True)
         for name in identities():
             _add_person(spec, head, torso, name)
+        arm = spec.worldbody.add_body(name='caregiver_arm', mocap=True)
+        arm.add_geom(name='arm', type=_CAPSULE, size=[ARM_RADIUS_M, 0.3, 0.0], material='cloth')
+        arm.add_geom(name='hand', type=_ELLIPSOID, size=HAND_SIZE_M, material='skin')
         for side in SIDES:
             eye = spec.worldbody.add_body(name=f'{side}_eye', mocap=True)
             lid = spec.worldbody.add_body(name=f'{side}_lid', mocap=True)
@@ -107,8 +115,11 @@ class CaregiverBodies:
         names = ['caregiver_torso', 'caregiver_head']
         names += [f'{side}_{part}' for part in ('eye', 'lid') for side in SIDES]
         self._mocap = [model.body(name).mocapid[0] for name in names]
+        self._arm_mocap = model.body('caregiver_arm').mocapid[0]
+        self._arm, self._hand = model.geom('arm').id, model.geom('hand').id
         self._lids = [model.geom(f'{side}_lid').id for side in SIDES]
         parts = [model.geom(f'{s}_{p}').id for s in SIDES for p in ('iris', 'pupil')]
+        parts += [self._arm, self._hand]
         model.geom_sameframe[parts] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
 
     def dress(self, look: Appearance) -> None:
@@ -124,6 +135,7 @@ class CaregiverBodies:
         for part in ('hair', 'shirt'):
             model.geom_rgba[model.geom(f'{look.identity}_{part}').id, :3] = getattr(look, part)
         model.geom_rgba[model.geom(f'{look.identity}_head').id, :3] = look.skin
+        model.geom_rgba[self._arm, :3], model.geom_rgba[self._hand, :3] = look.shirt, look.skin
         radius = float(asset[f'{look.identity}.eye_radius'])
         for side in SIDES:
             self._dress_eye(side, radius, look)
@@ -162,6 +174,21 @@ class CaregiverBodies:
             mujoco.mju_mat2Quat(data.mocap_quat[mocap], rotation.ravel())
         self._model.geom_group[self._lids] = _SHOWN if eyes_closed else _HIDDEN
 
+    def reach(self, data: mujoco.MjData, hand: np.ndarray | None) -> None:
+        """Stretch the nearer arm out to a point (3,) [m]; None hides it: both arms hang."""
+        model = self._model
+        model.geom_group[[self._arm, self._hand]] = _HIDDEN if hand is None else _SHOWN
+        if hand is None:
+            return
+        side = np.copysign(1.0, self.to_rest_frame(hand)[1])
+        shoulder = self.origin + self._facing @ (SHOULDER * [1.0, side, 1.0])
+        length = float(np.linalg.norm(hand - shoulder))
+        data.mocap_pos[self._arm_mocap] = shoulder
+        mujoco.mju_quatZ2Vec(data.mocap_quat[self._arm_mocap], (hand - shoulder) / length)
+        sleeve = max(length - HAND_SIZE_M[2] - ARM_RADIUS_M, 0.02)
+        model.geom_size[self._arm, 1] = model.geom_pos[self._arm, 2] = sleeve / 2.0
+        model.geom_pos[self._hand, 2] = length
+
 
 def _add_skin(spec: mujoco.MjSpec) -> None:
     """The painted skin, and materials that take their colour from each geom."""
@@ -188,7 +215,8 @@ def _add_person(
         ('shirt', torso, 'cloth', asset['shirt_faces']),
     )
     for part, body, material, faces in parts:
-        mesh = spec.add_mesh(name=f'{name}_{part}', inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+        # Open surfaces have no volume to weigh.
+        mesh = spec.add_mesh(name=f'{name}_{part}', inertia=_SHELL)
         mesh.uservert = asset[f'{name}.{part}'].ravel()
         mesh.userface = faces.ravel().astype(np.int32)
         if part == 'head':
@@ -200,6 +228,4 @@ def _add_person(
             meshname=mesh.name,
             material=material,
             rgba=[1.0, 1.0, 1.0, 1.0],
-            contype=0,
-            conaffinity=0,
         )

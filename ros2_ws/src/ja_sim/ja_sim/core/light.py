@@ -27,8 +27,11 @@ class Lighting:
             model.light_diffuse[lamp] = self._diffuse[lamp] * _strength(amount, rng)
             turn = amount * rng.uniform(-MAX_TURN_RAD, MAX_TURN_RAD)
             rotation = np.array(
-                [[math.cos(turn), -math.sin(turn), 0.0], [math.sin(turn), math.cos(turn), 0.0],
-                 [0.0, 0.0, 1.0]]
+                [
+                    [math.cos(turn), -math.sin(turn), 0.0],
+                    [math.sin(turn), math.cos(turn), 0.0],
+                    [0.0, 0.0, 1.0],
+                ]
             )
             model.light_dir[lamp] = rotation @ self._direction[lamp]
         model.vis.headlight.ambient[:] = self._ambient * _strength(amount, rng)

@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
+from ja_common.core.config import ConfigError
 from ja_common.core.geometry import angle_between, directions_of_vectors, vectors_of_directions
 
-from .scene import ObjectsSpec, SceneError
+from .specs import ObjectsSpec
 
 SHAPES = ('sphere', 'box', 'cylinder', 'ellipsoid', 'capsule')
 PATTERNS = ('plain', 'checker', 'dots', 'cross')
@@ -85,7 +86,7 @@ class Arrangement:
                     positions.append(place)
                 if len(positions) == self._spec.count:
                     return positions
-        raise SceneError(
+        raise ConfigError(
             f'objects: no room for {self._spec.count} objects {self._spec.gap_deg:g} deg apart; '
             'widen pan_deg and tilt_deg, or lower count or gap_deg'
         )

@@ -21,8 +21,8 @@ from .camera import Intrinsics, Observation, expose
 from .caregiver import CaregiverBodies, draw_appearance
 from .gaze import GazePose, GazeShift
 from .head import JointSample, PanTiltHead
-from .objects import Arrangement, ObjectBodies, Thing
 from .light import Lighting
+from .objects import Arrangement, ObjectBodies, Thing
 from .render import Renderer, buffer_size
 from .scene import Scene
 
@@ -65,6 +65,7 @@ class _View:
     eyes_closed: bool
     things: list[Thing]
     positions: np.ndarray
+    hand: np.ndarray | None
 
 
 class JointAttentionWorld:
@@ -247,6 +248,13 @@ class JointAttentionWorld:
             ]
         )
 
+    def _hand(self) -> np.ndarray | None:
+        """Where her hand is, (3,) [m], if she holds the object that she attends to."""
+        if self.scene.caregiver.shows_object != 'holds' or self._attended == ROBOT:
+            return None
+        below = np.array([0.0, 0.0, self._arrangement.things[self._attended].radius_m])
+        return self._positions()[self._attended] - below
+
     def _is_in_view(self, direction: np.ndarray) -> bool:
         view = np.radians([self.scene.head.view_pan_deg, self.scene.head.view_tilt_deg])
         return bool(np.all(np.abs(direction - self._head.posture) < view))
@@ -260,11 +268,13 @@ class JointAttentionWorld:
             self._blinking.closed(self._time_s),
             self._arrangement.things,
             self._positions(),
+            self._hand(),
         )
 
     def _draw(self, view: _View) -> np.ndarray:
         data = self._data
         self._caregiver.place(data, view.gaze, view.eyes_closed)
+        self._caregiver.reach(data, view.hand)
         self._objects.dress(view.things)
         self._objects.place(data, view.positions)
         rotation = head_rotation(view.posture)
