@@ -33,7 +33,7 @@ class AttentionConfig:
         0.02, 'the head is still when both joints are slower', low=0.0, high=10.0
     )
     crop_widths: float = parameter(
-        1.3, 'width of the face image (in widths of the face)', low=0.5, high=5.0
+        1.5, 'width of the face image (in widths of the face)', low=0.5, high=5.0
     )
 
 
@@ -95,16 +95,15 @@ class SalientFeatureDetector:
         then not known.
         """
         position = np.zeros(2) if posture is None else posture.position
-        faces = self._faces.look(image, camera, position, stamp_ns)
+        grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
+        faces = self._faces.look(image, grey, camera, position, stamp_ns)
         boxes = [face.box(camera, position) for face in faces]
         objects = self._objects.find(
             image, stamp_ns, camera, posture, [_whole_head(box) for box in boxes]
         )
         attended = bool(faces) and self._attends(faces[0].ray(position), posture)
         crop_box = self._crop_box(boxes[0]) if attended else None
-        face_image = None
-        if crop_box is not None:
-            face_image = crop_face(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), crop_box)
+        face_image = None if crop_box is None else crop_face(grey, crop_box)
         face_rows = [
             _row(Kind.FACE, box, camera, face.score, face.track_id, attended and index == 0)
             for index, (face, box) in enumerate(zip(faces, boxes, strict=True))

@@ -1,12 +1,13 @@
 """Keeps an eye on faces from image to image: where to look for them, and which is the caregiver's.
 
 A face is remembered by its direction from the base, so that the head's own motion does not lose
-it. At most two looks are spent on an image: one at the caregiver, one at the next place of a scan
-that goes round the picture in squares of several sizes.
+it. At most two looks are spent on an image: one at the caregiver, unless her face is unchanged,
+and one at the next place of a scan that goes round the picture in squares of several sizes.
 """
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -15,6 +16,7 @@ from ja_common.core.geometry import angle_between, directions_of_rays, rays_of_d
 from ja_common.core.posture import NS_PER_S
 from ja_perception.core.box import Box
 from ja_perception.core.camera_model import CameraModel
+from ja_perception.core.face_crop import FACE_COLUMNS, FACE_ROWS, crop_face
 from ja_perception.core.faces import Face, FaceFinder, without_doubles
 
 # A look at a known face takes this many face widths, which is what the detectors are trained on.
@@ -26,8 +28,13 @@ _SCAN_STEP = 0.6
 _SCAN_OVERLAP = 0.3
 # Sightings that share more than this are of one face.
 _SAME_OVERLAP = 0.3
-# The head is taken to have moved when a sighting lies farther off than this (in face widths).
-_MOVED_WIDTHS = 0.5
+# A resting face is found within this distance from its mean (in face widths).
+_JITTER_WIDTHS = 0.06
+# A face whose width differs by this share has come nearer or gone away.
+_OTHER_SIZE = 0.3
+_SIZES = 100
+# A face whose picture differs by less (3 grey levels a pixel) is where it was.
+_UNCHANGED_L1 = 3 * FACE_ROWS * FACE_COLUMNS
 
 
 @dataclass(frozen=True)
@@ -53,12 +60,17 @@ class FaceConfig:
         low=0.0, high=60.0,
     )  # fmt: skip
     face_averaging: int = parameter(
-        20, 'sightings over which the place of a resting head is averaged', low=1, high=1000
+        20, 'sightings over which the place of a resting face is averaged', low=1, high=1000
     )
 
 
 class WatchedFace:
-    """A face over time: where it was last seen, and the steadier place of the head."""
+    """A face over time, steadied: the detector's box jitters, and jitter would look like gaze.
+
+    The direction is averaged while the sightings stay within the detector's jitter, and follows
+    at once when they do not: a head that turns carries its box along. The size, which says only
+    how far away the person is, is averaged for longer.
+    """
 
     def __init__(self, track_id: int) -> None:
         self.track_id = track_id
@@ -68,39 +80,60 @@ class WatchedFace:
         self._direction = np.zeros(2)
         self._size = np.zeros(2)
         self._sightings = 0
+        self._sizes = 0
+        self._picture: NDArray[np.uint8] | None = None
 
-    def sight(
-        self, direction: NDArray[np.float64], size: NDArray[np.float64], score: float, longest: int
-    ) -> None:
+    def sight(self, direction: ArrayLike, size: ArrayLike, score: float, longest: int) -> None:
         """Take in a sighting: direction [rad] and box size (width, height) at unit focal length.
 
-        While the head stays, place and size are the mean of the last ``longest`` sightings or so:
-        the box of a detector jitters, and follows the nose when the head turns, but the picture
-        that the learner sees must not move with it. A head that went elsewhere starts anew.
+        ``longest``: sightings of a resting face over which its direction is averaged.
         """
-        away = angle_between(direction, self._direction)
-        if self._sightings and away > _MOVED_WIDTHS * self._size[0]:
+        direction, size = np.asarray(direction, float), np.asarray(size, float)
+        if angle_between(direction, self._direction) > _JITTER_WIDTHS * size[0]:
             self._sightings = 0
+        if abs(size[0] - self._size[0]) > _OTHER_SIZE * self._size[0]:
+            self._sizes = 0
         self._sightings = min(self._sightings + 1, longest)
-        share = 1 / self._sightings
-        self._direction = self._direction + share * (direction - self._direction)
-        self._size = self._size + share * (size - self._size)
+        self._sizes = min(self._sizes + 1, _SIZES)
+        self._direction = self._direction + (direction - self._direction) / self._sightings
+        self._size = self._size + (size - self._size) / self._sizes
         self.score, self.missed_s = score, 0.0
 
-    @property
-    def direction(self) -> NDArray[np.float64]:
-        """Direction (pan, tilt) [rad] of the head."""
-        return self._direction
-
     def ray(self, posture: ArrayLike) -> NDArray[np.float64]:
-        """Ray (x, y) to the head from a posture; NaN when behind."""
+        """Ray (x, y) to the face from a posture; NaN when behind."""
         return rays_of_directions(posture, self._direction)
 
     def box(self, camera: CameraModel, posture: ArrayLike) -> Box:
-        """Where the head is seen from a posture [px]; NaN when behind."""
-        u, v = camera.pixels(self.ray(posture))
-        width, height = self._size * (camera.fx, camera.fy)
-        return Box(float(u), float(v), float(width), float(height))
+        """Where the face is seen from a posture [px]; NaN when behind."""
+        u, v = camera.pixels(self.ray(posture)).tolist()
+        width, height = (self._size * (camera.fx, camera.fy)).tolist()
+        return Box(u, v, width, height)
+
+    def remember(self, grey: NDArray[np.uint8], box: Box) -> None:
+        """Keep its picture, cut from an (H, W) image, for ``is_unchanged``."""
+        self._picture = crop_face(grey, box)
+
+    def is_unchanged(self, grey: NDArray[np.uint8], box: Box) -> bool:
+        """Does the face look as it did when it was last found?"""
+        if self._picture is None:
+            return False
+        return cv2.norm(crop_face(grey, box), self._picture, cv2.NORM_L1) < _UNCHANGED_L1
+
+
+@dataclass(frozen=True)
+class _View:
+    """An image, also in grey, and how its pixels lie in space."""
+
+    image: NDArray[np.uint8]
+    grey: NDArray[np.uint8]
+    camera: CameraModel
+    posture: NDArray[np.float64]
+
+    def box(self, face: WatchedFace) -> Box:
+        return face.box(self.camera, self.posture)
+
+    def shows(self, face: WatchedFace) -> bool:
+        return self.camera.contains(self.camera.pixels(face.ray(self.posture)))
 
 
 class FaceWatch:
@@ -112,31 +145,39 @@ class FaceWatch:
         self._faces: list[WatchedFace] = []
         self._caregiver: WatchedFace | None = None
         self._next_id = 0
-        self._scan_place = 0
+        self._scan_place = -1
         self._until_scan = 0
         self._stamp_ns: int | None = None
 
     def look(
-        self, image: NDArray[np.uint8], camera: CameraModel, posture: ArrayLike, stamp_ns: int
+        self,
+        image: NDArray[np.uint8],
+        grey: NDArray[np.uint8],
+        camera: CameraModel,
+        posture: NDArray[np.float64],
+        stamp_ns: int,
     ) -> list[WatchedFace]:
-        """The faces in view of an (H, W, 3) RGB image, the caregiver's first.
+        """The faces in view of an (H, W, 3) RGB image, (H, W) in grey; the caregiver's first.
 
         ``posture`` (pan, tilt) [rad] at the image's stamp. The caregiver is the largest face when
         none was known, and stays so until her face is forgotten.
         """
+        view = _View(image, grey, camera, posture)
         elapsed_s = self._elapsed(stamp_ns)
-        expected = self._in_view(camera, posture)
-        found = self._found(image, camera, posture, expected)
+        expected = [face for face in self._faces if view.shows(face)]
         for face in expected:
             face.missed_s += elapsed_s
-        for sighting in found:
-            self._sight(sighting, camera, posture, expected)
+        for sighting in self._find(view, expected):
+            self._sight(sighting, view, expected)
         self._forget(expected)
-        present = self._in_view(camera, posture)
-        present = [f for f in present if f.missed_s <= self._config.hold_face_s]
+        present = [
+            face
+            for face in self._faces
+            if face.missed_s <= self._config.hold_face_s and view.shows(face)
+        ]
         if self._caregiver is None and present:
-            self._caregiver = max(present, key=lambda f: f.box(camera, posture).area)
-        return sorted(present, key=lambda f: (f is not self._caregiver, f.track_id))
+            self._caregiver = max(present, key=lambda face: view.box(face).area)
+        return sorted(present, key=lambda face: (face is not self._caregiver, face.track_id))
 
     def _elapsed(self, stamp_ns: int) -> float:
         before, self._stamp_ns = self._stamp_ns, stamp_ns
@@ -148,36 +189,30 @@ class FaceWatch:
             return 0.0
         return (stamp_ns - before) / NS_PER_S
 
-    def _in_view(self, camera: CameraModel, posture: ArrayLike) -> list[WatchedFace]:
-        return [f for f in self._faces if camera.contains(camera.pixels(f.ray(posture)))]
-
-    def _found(
-        self,
-        image: NDArray[np.uint8],
-        camera: CameraModel,
-        posture: ArrayLike,
-        expected: list[WatchedFace],
-    ) -> list[Face]:
-        found: list[Face] = []
-        whole = whole_square(image)
+    def _find(self, view: _View, expected: list[WatchedFace]) -> list[Face]:
+        whole = whole_square(view.image)
         squares: list[Box] = []
-        if self._caregiver in expected:
-            squares.append(look_at(self._caregiver.box(camera, posture), whole))
+        caregiver = self._caregiver
+        if caregiver is not None and caregiver in expected:
+            box = view.box(caregiver)
+            if caregiver.is_unchanged(view.grey, box):
+                caregiver.missed_s = 0.0
+            else:
+                squares.append(look_at(box, whole))
         if self._scan_is_due():
-            places = scan_squares(image, self._smallest_scan(image))
+            places = scan_squares(view.image, self._config.smallest_scan_px)
             self._scan_place = (self._scan_place + 1) % len(places)
             if places[self._scan_place] not in squares:
                 squares.append(places[self._scan_place])
+        known = [view.box(face) for face in expected]
+        found: list[Face] = []
         for square in squares:
-            for face in self._finder.find(image, square):
-                if self._is_known(face, camera, posture, expected):
+            for face in self._finder.find(view.image, square):
+                if any(face.box.overlap(box) > _SAME_OVERLAP for box in known):
                     found.append(face)
                 else:
-                    found += self._second_look(image, face, square, whole)
+                    found += self._second_look(view.image, face, square, whole)
         return without_doubles(found)
-
-    def _smallest_scan(self, image: NDArray[np.uint8]) -> int:
-        return min(self._config.smallest_scan_px, max(image.shape[:2]))
 
     def _scan_is_due(self) -> bool:
         if self._caregiver is None or self._until_scan <= 0:
@@ -185,11 +220,6 @@ class FaceWatch:
             return True
         self._until_scan -= 1
         return False
-
-    def _is_known(
-        self, face: Face, camera: CameraModel, posture: ArrayLike, expected: list[WatchedFace]
-    ) -> bool:
-        return any(face.box.overlap(f.box(camera, posture)) > _SAME_OVERLAP for f in expected)
 
     def _second_look(
         self, image: NDArray[np.uint8], face: Face, square: Box, whole: Box
@@ -202,22 +232,24 @@ class FaceWatch:
         again = [face] if framed == square else self._finder.find(image, framed)
         return [f for f in again if f.box.overlap(face.box) > _SAME_OVERLAP and f.score >= least]
 
-    def _sight(
-        self, face: Face, camera: CameraModel, posture: ArrayLike, expected: list[WatchedFace]
-    ) -> None:
-        track = max(expected, key=lambda f: face.box.overlap(f.box(camera, posture)), default=None)
-        if track is None or face.box.overlap(track.box(camera, posture)) <= _SAME_OVERLAP:
+    def _sight(self, face: Face, view: _View, expected: list[WatchedFace]) -> None:
+        overlaps = [face.box.overlap(view.box(known)) for known in expected]
+        if overlaps and max(overlaps) > _SAME_OVERLAP:
+            track = expected[overlaps.index(max(overlaps))]
+        else:
             track = WatchedFace(self._next_id)
             self._next_id += 1
             self._faces.append(track)
+        camera = view.camera
         ray = camera.rays((face.box.u, face.box.v))
-        size = np.array([face.box.width / camera.fx, face.box.height / camera.fy])
-        direction = directions_of_rays(posture, ray)
+        size = (face.box.width / camera.fx, face.box.height / camera.fy)
+        direction = directions_of_rays(view.posture, ray)
         track.sight(direction, size, face.score, self._config.face_averaging)
+        track.remember(view.grey, view.box(track))
 
     def _forget(self, expected: list[WatchedFace]) -> None:
-        gone = [f for f in expected if f.missed_s > self._config.forget_face_s]
-        self._faces = [f for f in self._faces if f not in gone]
+        gone = [face for face in expected if face.missed_s > self._config.forget_face_s]
+        self._faces = [face for face in self._faces if face not in gone]
         if self._caregiver in gone:
             self._caregiver = None
 

@@ -71,12 +71,19 @@ def motion_map(grey: Mask, expected: Mask, seen_before: Mask, config: FeatureCon
     """
     if not seen_before.any():
         return np.zeros_like(grey)
+    # Detail as fine as the pixels looks different after every shift by part of a pixel.
+    grey, expected = cv2.blur(grey, (3, 3)), cv2.blur(expected, (3, 3))
     lighter = cv2.mean(grey, seen_before)[0] - cv2.mean(expected, seen_before)[0]
     tolerance = 255 * config.motion_contrast
     kernel = np.ones((3, 3), np.uint8)
     highest = cv2.add(cv2.dilate(expected, kernel), lighter + tolerance)
     lowest = cv2.add(cv2.erode(expected, kernel), lighter - tolerance)
     moving = (grey > highest) | (grey < lowest)
-    # A lone pixel is noise.
-    moved = cv2.morphologyEx(moving.view(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
-    return moved & seen_before
+    return without_specks(moving.view(np.uint8)) & seen_before
+
+
+def without_specks(mask: Mask) -> Mask:
+    """The mask without what is thinner than two pixels: noise."""
+    kernel = np.ones((2, 2), np.uint8)
+    # Opposite anchors: with its default ones an even kernel shifts the mask by a pixel.
+    return cv2.dilate(cv2.erode(mask, kernel, anchor=(0, 0)), kernel, anchor=(1, 1))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ja_common.core.config import parameter
 from ja_perception.core.box import Box
-from ja_perception.core.features import ColourMap, Mask
+from ja_perception.core.features import ColourMap, Mask, without_specks
 
 _HUES = 180
 # Two parts of one region are two objects when their boxes share less than this.
@@ -16,6 +16,8 @@ _SEPARATE_OVERLAP = 0.4
 # A hue peak stands alone when the valley beside it is lower than this share of the peak.
 _VALLEY = 0.4
 _MERGED_OVERLAP = 0.5
+# Hues that span less than this (half degrees) are one hue, and need no closer look.
+_ONE_HUE = 20
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class Grouping:
 
     def by_colour(self, colour: ColourMap) -> list[Box]:
         """Regions of bright colour; touching regions of different hues are separated."""
-        bright = cv2.morphologyEx(colour.bright, cv2.MORPH_OPEN, np.ones((2, 2), np.uint8))
+        bright = without_specks(colour.bright)
         smallest = self._smallest(bright)
         boxes = []
         labels, regions = _regions(bright, smallest)
@@ -131,6 +133,8 @@ def _hue_families(hues: NDArray[np.uint8]) -> NDArray[np.intp] | None:
 
     The hue circle is cut in the valleys between the peaks of its smoothed histogram.
     """
+    if min(np.ptp(hues), np.ptp((hues.astype(int) + _HUES // 2) % _HUES)) < _ONE_HUE:
+        return None
     histogram = np.bincount(hues, minlength=_HUES)[:_HUES].astype(np.float32)
     ring = np.tile(histogram, 3)[None]
     smooth = cv2.GaussianBlur(ring, (0, 0), 4)[0, _HUES : 2 * _HUES]
