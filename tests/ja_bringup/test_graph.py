@@ -10,6 +10,7 @@ from rclpy.node import Node
 from ja_bringup.graph import (
     CONFIG,
     NodeSpec,
+    preset,
     rig_graph,
     sim_graph,
     split_ros_arguments,
@@ -32,19 +33,26 @@ def test_parameters_arrive_as_they_were_meant(value, ros_context):
     assert (list(received) if isinstance(value, list) else received) == value
 
 
-def test_arguments_of_the_user_stand_last_so_that_they_win(ros_context: Context, tmp_path: Path):
-    params_file = tmp_path / 'params.yaml'
-    params_file.write_text('/**:\n  ros__parameters:\n    a: 1\n    b: 1\n    c: 1\n')
-    mine = tmp_path / 'mine.yaml'
-    mine.write_text('/**:\n  ros__parameters:\n    b: 3\n')
-    spec = NodeSpec('p', 't', {'c': 2}, {'chatter': 'talk'}, [params_file])
-    user = ['--params-file', str(mine), '-p', 'c:=3', '-r', '__ns:=/robot']
+def test_the_user_wins_over_the_preset(ros_context: Context, tmp_path: Path):
+    """By a file for all, by a file for one node, and by -p."""
+    ours = tmp_path / 'preset.yaml'
+    ours.write_text(
+        '/**:\n  ros__parameters: {a: 1, b: 1, c: 1, d: 1}\n'
+        '/**/t:\n  ros__parameters: {b: 2, c: 2, d: 2, e: 2}\n'
+        '/**/other:\n  ros__parameters: {a: 9}\n'
+    )
+    theirs = tmp_path / 'mine.yaml'
+    theirs.write_text(
+        '/**:\n  ros__parameters: {b: 3}\n/**/t:\n  ros__parameters: {c: 3}\n'
+    )
+    spec = NodeSpec('p', 't', preset(ours, 't'), {'chatter': 'talk'})
+    user = ['--params-file', str(theirs), '-p', 'd:=3', '-r', '__ns:=/robot']
     [spec] = with_arguments([spec], user)
     node = Node('t', context=ros_context, cli_args=spec.ros_arguments())
-    values = [node.declare_parameter(name, 0).value for name in 'abc']
+    values = {name: node.declare_parameter(name, 0).value for name in 'abcde'}
     namespace, topic = node.get_namespace(), node.resolve_topic_name('chatter')
     node.destroy_node()
-    assert values == [1, 3, 3]
+    assert values == {'a': 1, 'b': 3, 'c': 3, 'd': 3, 'e': 2}
     assert (namespace, topic) == ('/robot', '/robot/talk')
 
 

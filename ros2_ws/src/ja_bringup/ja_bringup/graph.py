@@ -18,15 +18,14 @@ class NodeSpec:
     """One node, as its own process or as one of many in a process.
 
     `thing` is the file's name without `_node`, the executable's and, unless remapped, the node's.
-    `arguments` are ROS arguments for every node of the graph (`-r`, `-p`, `--params-file`); they
-    stand last, so that they win. `environ` is added to the process's environment.
+    `arguments` are further ROS arguments, the user's (`-r`, `-p`, `--params-file`); they stand
+    last, so that they win. `environ` is added to the process's environment.
     """
 
     package: str
     thing: str
     parameters: Mapping[str, Any] = field(default_factory=dict)
     remappings: Mapping[str, str] = field(default_factory=dict)
-    params_files: Sequence[Path] = ()
     arguments: Sequence[str] = ()
     environ: Mapping[str, str] = field(default_factory=dict)
 
@@ -41,8 +40,6 @@ class NodeSpec:
     def ros_arguments(self) -> list[str]:
         """The node's arguments, from `--ros-args` on."""
         arguments = ['--ros-args']
-        for path in self.params_files:
-            arguments += ['--params-file', str(path)]
         for name, value in self.parameters.items():
             # YAML's flow style is what rcl reads after `:=`.
             text = yaml.safe_dump(value, default_flow_style=True, width=10**6)
@@ -80,19 +77,26 @@ def with_arguments(graph: Sequence[NodeSpec], arguments: Sequence[str]) -> list[
     return [replace(node, arguments=[*node.arguments, *arguments]) for node in graph]
 
 
+def preset(path: Path, thing: str) -> dict[str, Any]:
+    """What a ROS parameter file says to one node: the section of all, then the node's own.
+
+    Read here and handed over with `-p`: rcl prefers a file's section for one node to any `-p`, so
+    that a user's `-p` would not win over ours.
+    """
+    sections = yaml.safe_load(path.read_text())
+    parameters: dict[str, Any] = {}
+    for section in ('/**', f'/**/{thing}'):
+        parameters |= sections.get(section, {}).get('ros__parameters', {})
+    return parameters
+
+
 def sim_graph(seed: int = 0, sim_parameters: Mapping[str, Any] | None = None) -> list[NodeSpec]:
     """The mind before the simulated head. The seed is everybody's, so that a run repeats."""
-    params_file = CONFIG / 'demo.yaml'
-    world = [
-        NodeSpec('ja_sim', 'scorer', params_files=[params_file]),
-        NodeSpec(
-            'ja_sim',
-            'sim',
-            params_files=[params_file],
-            parameters={'seed': seed, **(sim_parameters or {})},
-        ),
-    ]
-    return [*_mind(params_file, seed), *world]
+    sim = {'seed': seed, **(sim_parameters or {})}
+    return _configured(
+        CONFIG / 'demo.yaml',
+        [*_mind(seed), NodeSpec('ja_sim', 'scorer'), NodeSpec('ja_sim', 'sim', sim)],
+    )
 
 
 def rig_graph(source: str | None = None, seed: int = 0) -> list[NodeSpec]:
@@ -102,26 +106,30 @@ def rig_graph(source: str | None = None, seed: int = 0) -> list[NodeSpec]:
     that picture. Without one, the rig's own drivers publish `image_raw` and `joint_states`, and
     obey `joint_commands`.
     """
-    params_file = CONFIG / 'rig.yaml'
-    mind = _mind(params_file, seed)
-    if source is None:
-        return mind
-    camera = NodeSpec(
-        'ja_perception',
-        'camera',
-        params_files=[params_file],
-        parameters={'source': source},
-        remappings={'image_raw': 'wide/image_raw', 'camera_info': 'wide/camera_info'},
-    )
-    return [*mind, NodeSpec('ja_sim', 'digital_head', params_files=[params_file]), camera]
+    graph = _mind(seed)
+    if source is not None:
+        wide = {name: f'wide/{name}' for name in ('image_raw', 'camera_info')}
+        graph += [
+            NodeSpec('ja_sim', 'digital_head'),
+            NodeSpec('ja_perception', 'camera', {'source': source}, wide),
+        ]
+    return _configured(CONFIG / 'rig.yaml', graph)
 
 
-def _mind(params_file: Path, seed: int) -> list[NodeSpec]:
+def _mind(seed: int) -> list[NodeSpec]:
     """What looks, learns and moves, whatever the head and the camera are."""
     return [
-        NodeSpec('ja_perception', 'salient_feature_detector', params_files=[params_file]),
-        NodeSpec('ja_control', 'visual_feedback_controller', params_files=[params_file]),
-        NodeSpec('ja_learning', 'internal_evaluator', params_files=[params_file]),
-        NodeSpec('ja_learning', 'learning_module', {'seed': seed}, params_files=[params_file]),
-        NodeSpec('ja_control', 'gate', {'seed': seed}, params_files=[params_file]),
+        NodeSpec('ja_perception', 'salient_feature_detector'),
+        NodeSpec('ja_control', 'visual_feedback_controller'),
+        NodeSpec('ja_learning', 'internal_evaluator'),
+        NodeSpec('ja_learning', 'learning_module', {'seed': seed}),
+        NodeSpec('ja_control', 'gate', {'seed': seed}),
+    ]
+
+
+def _configured(path: Path, graph: Sequence[NodeSpec]) -> list[NodeSpec]:
+    """The graph with a preset below the parameters that it has already."""
+    return [
+        replace(node, parameters={**preset(path, node.thing), **node.parameters})
+        for node in graph
     ]
