@@ -199,10 +199,11 @@ class AttentionCycle:
             self._target = self._caregiver
 
     def _draw(self, percept: Percept) -> None:
-        # One draw a shift, whether or not the learner has an answer: the same seed gives the
-        # same sequence of sources.
-        learner_drawn = self._rng.random() < self.gating.p_lm(self.trials)
-        delta = percept.lm_delta if learner_drawn else None
+        # Drawn whether or not the learner has an answer: the same seed gives the same sequence of
+        # sources.
+        if self._shifts == 0 or self.config.source_drawn == 'every_shift':
+            self._learner_drawn = bool(self._rng.random() < self.gating.p_lm(self.trials))
+        delta = percept.lm_delta if self._learner_drawn else None
         self._source = Source.LEARNING_MODULE
         if delta is None:
             self._source, delta = Source.VISUAL_FEEDBACK, percept.vf_delta
