@@ -1,0 +1,54 @@
+"""A node's health: silence, problems that fade, news only."""
+
+from ja_common.core.health import Health, Level
+
+
+def test_healthy_node_says_ok_and_how_much_it_hears():
+    health = Health(now_s=100.0)
+    health.expect('/image', every_s=1.0)
+    for i in range(20):
+        health.heard('/image', 100.0 + i / 10)
+    health.values['trials'] = '7'
+    report = health.report(102.0)
+    assert (report.level, report.message) == (Level.OK, 'OK')
+    assert report.values == {
+        '/image received': '20', '/image rate [1/s]': '10.0', 'trials': '7',
+    }  # fmt: skip
+    assert health.report(104.0).values['/image rate [1/s]'] == '0.0', 'since the last report'
+
+
+def test_silence_is_noticed_from_the_start_and_after_the_last_message():
+    health = Health(now_s=0.0)
+    health.expect('/image', every_s=1.0)
+    health.expect('/sometimes', every_s=None)
+    assert health.silent(0.9) == {}
+    assert health.silent(1.1) == {'/image': 1.0}
+    health.heard('/image', 1.2)
+    assert health.silent(2.1) == {}
+    assert health.silent(2.3) == {'/image': 1.0}
+
+
+def test_problem_is_news_once_until_it_changes_or_comes_back():
+    health = Health(now_s=0.0, error_memory_s=5.0)
+    assert health.problem('/image', 'no data', 1.0)
+    assert not health.problem('/image', 'no data', 2.0)
+    assert health.problem('/image', 'odd width', 3.0)
+    assert health.problem('/image', 'odd width', 8.1), 'after a quiet time it is news again'
+
+
+def test_report_has_the_worst_level_and_every_message_until_they_fade():
+    health = Health(now_s=0.0, error_memory_s=5.0)
+    health.problem('a', 'slow', 1.0, Level.WARN)
+    health.problem('b', 'broken', 3.0, Level.ERROR)
+    report = health.report(4.0)
+    assert (report.level, report.message) == (Level.ERROR, 'slow; broken')
+    assert health.report(7.0).message == 'broken'
+    assert health.report(9.0).level is Level.OK
+
+
+def test_resolved_problem_is_gone_at_once():
+    health = Health(now_s=0.0)
+    health.problem('a', 'slow', 1.0)
+    health.resolved('a')
+    health.resolved('never happened')
+    assert health.report(1.0).level is Level.OK

@@ -1,0 +1,137 @@
+"""The posture at an image's stamp: interpolated, never the newest; nothing waits for ever."""
+
+import numpy as np
+import pytest
+
+from ja_common.core.posture import Posture, PostureHistory, PostureJoin
+from ja_common.core.stamps import NS_PER_S
+
+MS = 1_000_000
+
+
+def history(*samples, **options):
+    """A history of (milliseconds, pan) samples."""
+    kept = PostureHistory(**options)
+    for ms, pan in samples:
+        kept.add(ms * MS, (pan, 0.0))
+    return kept
+
+
+def test_posture_is_interpolated_at_the_stamp():
+    kept = PostureHistory()
+    kept.add(100 * MS, (0.10, 0.0), (1.0, 0.0))
+    kept.add(120 * MS, (0.14, -0.2), (3.0, -4.0))
+    at = kept.at(105 * MS)
+    assert at.stamp_ns == 105 * MS
+    assert at.position == pytest.approx((0.11, -0.05))
+    assert at.velocity == pytest.approx((1.5, -1.0))
+    assert kept.at(120 * MS).position == pytest.approx((0.14, -0.2))
+
+
+@pytest.mark.parametrize('ms', [99, 121])
+def test_nothing_is_extrapolated(ms):
+    assert history((100, 0.1), (120, 0.2)).at(ms * MS) is None
+
+
+def test_empty_history_knows_nothing():
+    empty = PostureHistory()
+    assert empty.newest is None
+    assert empty.at(0) is None
+
+
+def test_samples_out_of_order_are_put_in_order():
+    kept = history((100, 0.0), (140, 0.4), (120, 0.1))
+    assert kept.at(110 * MS).position[0] == pytest.approx(0.05)
+    assert kept.at(130 * MS).position[0] == pytest.approx(0.25)
+    assert kept.newest.stamp_ns == 140 * MS
+
+
+def test_duplicates_are_dropped():
+    kept = history((100, 0.0), (120, 0.2), (120, 9.0))
+    assert kept.at(120 * MS).position[0] == pytest.approx(0.2)
+
+
+def test_velocity_is_the_difference_where_none_is_measured():
+    kept = history((100, 0.0), (120, 0.02))
+    assert kept.newest.velocity == pytest.approx((1.0, 0.0))
+
+
+def test_history_starts_again_when_the_clock_is_set_back():
+    kept = history((10_000, 0.5), (10_100, 0.6), (1_000, 0.1), (1_100, 0.2), horizon_s=2.0)
+    assert kept.newest.stamp_ns == 1_100 * MS
+    assert kept.at(1_050 * MS).position[0] == pytest.approx(0.15)
+    assert kept.at(10_050 * MS) is None
+
+
+def test_history_forgets_what_is_older_than_its_horizon():
+    kept = history((0, 0.0), (1_000, 0.1), (2_500, 0.2), horizon_s=2.0)
+    assert kept.at(500 * MS) is None
+    assert kept.at(1_000 * MS) is not None
+
+
+@pytest.mark.parametrize('position', [(np.nan, 0), (0, np.inf), (0,), (0, 0, 0)])
+def test_bad_sample_is_refused_and_nothing_added(position):
+    kept = history((100, 0.0))
+    with pytest.raises(ValueError, match='two finite numbers'):
+        kept.add(120 * MS, position)
+    with pytest.raises(ValueError, match='joint velocity'):
+        kept.add(120 * MS, (0.0, 0.0), velocity=(np.nan, 0.0))
+    assert kept.newest.stamp_ns == 100 * MS
+
+
+def test_still_means_both_joints():
+    posture = Posture(0, np.zeros(2), np.array([0.01, -0.2]))
+    assert not posture.is_still(0.2)
+    assert posture.is_still(0.21)
+
+
+def given_now(join):
+    return [(item, None if p is None else p.stamp_ns // MS) for item, p in join.ready()]
+
+
+def test_image_waits_for_the_joint_states_of_its_time():
+    kept = history((100, 0.0))
+    join = PostureJoin(kept)
+    join.add(110 * MS, 'a')
+    join.add(130 * MS, 'b')
+    assert given_now(join) == []
+    kept.add(120 * MS, (0.2, 0.0))
+    assert given_now(join) == [('a', 110)]
+    kept.add(130 * MS, (0.3, 0.0))
+    assert given_now(join) == [('b', 130)]
+    assert len(join) == 0
+
+
+def test_image_older_than_the_history_is_given_without_posture():
+    join = PostureJoin(history((100, 0.0), (120, 0.1)))
+    join.add(50 * MS, 'old')
+    join.add(110 * MS, 'good')
+    assert given_now(join) == [('old', None), ('good', 110)]
+
+
+def test_waiting_is_bounded():
+    join = PostureJoin(PostureHistory(), depth=3)
+    for i in range(5):
+        join.add(i * MS, i)
+    assert given_now(join) == [(0, None), (1, None)]
+    assert len(join) == 3
+
+
+def test_image_from_the_future_does_not_hold_up_the_others():
+    """A clock set back leaves an item that waits for a time long gone."""
+    kept = history((90_000, 0.0))
+    join = PostureJoin(kept)
+    join.add(90 * NS_PER_S + 10 * MS, 'before the jump')
+    kept.add(100 * MS, (0.0, 0.0))
+    kept.add(120 * MS, (0.0, 0.0))
+    join.add(110 * MS, 'after it')
+    assert given_now(join) == [('after it', 110)]
+
+
+def test_items_behind_one_whose_handling_fails_still_wait():
+    kept = history((100, 0.0), (120, 0.1))
+    join = PostureJoin(kept)
+    join.add(105 * MS, 'breaks')
+    join.add(110 * MS, 'next')
+    next(iter(join.ready()))  # its handler raised: nobody asks this iterator again
+    assert given_now(join) == [('next', 110)]

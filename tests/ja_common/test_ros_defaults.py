@@ -1,0 +1,24 @@
+"""The ROS defaults of every entry point: set where the user is silent."""
+
+import xml.etree.ElementTree as ElementTree
+
+from ja_common.ros_defaults import ENVIRONMENT, PROFILE, apply_ros_defaults
+
+
+def test_silent_user_gets_every_default():
+    environ = {}
+    apply_ros_defaults(environ)
+    assert environ == ENVIRONMENT
+    assert environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
+
+
+def test_users_own_settings_win():
+    own = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', 'MALLOC_TOP_PAD_': 'no number'}
+    environ = dict(own)
+    apply_ros_defaults(environ)
+    assert environ == ENVIRONMENT | own
+
+
+def test_profile_is_shipped_and_readable():
+    profile = ElementTree.fromstring(PROFILE.read_text())
+    assert [e for e in profile.iter() if e.tag.endswith('segment_size')]

@@ -1,0 +1,39 @@
+"""The table of topics: names that remap, and qualities of service that meet."""
+
+import pytest
+from rclpy.qos import HistoryPolicy, QoSCompatibility, ReliabilityPolicy, qos_check_compatible
+from rclpy.qos import qos_profile_sensor_data as best_effort_camera
+from rclpy.qos import qos_profile_system_default as reliable_camera
+
+from ja_common.topics import CLOCK, DIAGNOSTICS, IMAGE, JOINT_STATES, TOPICS
+
+by_name = pytest.mark.parametrize('topic', TOPICS, ids=lambda topic: topic.name)
+
+
+def test_every_name_stands_once():
+    names = [topic.name for topic in TOPICS]
+    assert len(set(names)) == len(names) >= 15
+
+
+@by_name
+def test_names_are_relative_so_that_namespaces_work(topic):
+    assert not topic.name.startswith('/') or topic in (CLOCK, DIAGNOSTICS)
+    assert topic.purpose
+
+
+@by_name
+def test_who_hears_matches_who_says(topic):
+    compatibility, reason = qos_check_compatible(topic.says, topic.hears)
+    assert compatibility is not QoSCompatibility.ERROR, reason
+    assert topic.hears.history is HistoryPolicy.KEEP_LAST
+
+
+@pytest.mark.parametrize('topic', [IMAGE, JOINT_STATES], ids=lambda topic: topic.name)
+@pytest.mark.parametrize('driver', [best_effort_camera, reliable_camera])
+def test_any_driver_is_heard(topic, driver):
+    assert qos_check_compatible(driver, topic.hears)[0] is not QoSCompatibility.ERROR
+
+
+def test_only_the_newest_image_waits():
+    assert IMAGE.hears.depth == 1
+    assert IMAGE.hears.reliability is ReliabilityPolicy.BEST_EFFORT

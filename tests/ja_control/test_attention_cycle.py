@@ -1,0 +1,310 @@
+"""The attention cycle, trial after trial, in a world that is nothing but angles."""
+
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ja_common.core.posture import Posture
+from ja_control.core.attention_cycle import (
+    AttentionCycle,
+    AttentionCycleConfig,
+    Percept,
+    Phase,
+    Source,
+)
+from ja_control.core.gating import Gating, GatingConfig
+
+PERIOD_S = 0.1
+VIEW = np.radians([18.0, 13.5])
+D_TH = np.radians(6.0)
+CONFIG = AttentionCycleConfig()
+
+
+class AngleWorld:
+    """A head of limited speed (and dead time), the caregiver's face, and objects, as directions.
+
+    `learner` is what the learning module proposes at a posture. Objects are given most salient
+    first.
+    """
+
+    def __init__(self, objects=(), face=(0.0, 0.0), dead_images=0, speed=2.0):
+        self.objects = [np.array(o) for o in objects]
+        self.face = None if face is None else np.array(face)
+        self.learner = lambda posture: None
+        self.stamp_ns = 10**9
+        self.position, self.velocity = np.zeros(2), np.zeros(2)
+        self._speed = speed
+        self._orders = deque([np.zeros(2)] * dead_images)
+
+    def percept(self):
+        still = not self.velocity.any()
+        in_view = [o - self.position for o in self.objects if self._sees(o)]
+        centred = [d for d in in_view if np.hypot(*d) < D_TH]
+        return Percept(
+            Posture(self.stamp_ns, self.position.copy(), self.velocity.copy()),
+            face_delta=self.face - self.position if self._sees(self.face) else None,
+            vf_delta=in_view[0] if in_view else None,
+            lm_delta=self.learner(self.position),
+            fixation=self.position + centred[0] if centred and still else None,
+        )
+
+    def obey(self, target):
+        """One image's time passes."""
+        self._orders.append(np.array(target))
+        reach = self._speed * PERIOD_S
+        way = np.clip(self._orders.popleft() - self.position, -reach, reach)
+        self.position = self.position + way
+        self.velocity = way / PERIOD_S
+        self.stamp_ns += round(PERIOD_S * 1e9)
+
+    def _sees(self, direction):
+        return direction is not None and bool(np.all(np.abs(direction - self.position) < VIEW))
+
+
+def make_cycle(p_lm=0.0, seed=0, **config):
+    gating = Gating(GatingConfig(gating='constant', p_lm_max=p_lm))
+    return AttentionCycle(replace(CONFIG, **config), gating, np.random.default_rng(seed))
+
+
+def run(cycle, world, images):
+    """Let the cycle drive the world; [(percept, decision)] of every image."""
+    rounds = []
+    for _ in range(images):
+        percept = world.percept()
+        decision = cycle.step(percept)
+        world.obey(decision.target)
+        rounds.append((percept, decision))
+    return rounds
+
+
+def phases(rounds):
+    """The phases in the order in which they came, each run once."""
+    found = [decision.phase for _, decision in rounds]
+    return [p for i, p in enumerate(found) if i == 0 or p is not found[i - 1]]
+
+
+def first(rounds, phase):
+    return next(i for i, (_, decision) in enumerate(rounds) if decision.phase is phase)
+
+
+def test_visual_feedback_fixates_the_salient_object_and_the_head_looks_back():
+    world = AngleWorld(objects=[(0.25, 0.1), (-0.2, 0.0)])
+    cycle = make_cycle()
+    rounds = run(cycle, world, 40)
+    assert phases(rounds)[:3] == [Phase.LOOK, Phase.SHIFT, Phase.LOOK]
+    shift = first(rounds, Phase.SHIFT)
+    decision = rounds[shift][1]
+    assert decision.source is Source.VISUAL_FEEDBACK
+    assert decision.target == pytest.approx((0.25, 0.1))
+    done = next(i for i, (_, d) in enumerate(rounds) if d.trials == 1)
+    assert rounds[done][0].fixation == pytest.approx((0.25, 0.1))
+    assert rounds[done][1].target == pytest.approx((0.0, 0.0)), 'back to where the face was'
+    assert cycle.trials >= 2, 'and then again'
+
+
+def test_head_dwells_on_the_centred_face_before_the_first_shift():
+    world = AngleWorld(objects=[(0.25, 0.0)], face=(0.1, 0.05))
+    rounds = run(make_cycle(dwell_s=0.5), world, 20)
+    shift = first(rounds, Phase.SHIFT)
+    centred = next(
+        i for i, (p, _) in enumerate(rounds)
+        if np.hypot(*p.face_delta) < CONFIG.look_tolerance_rad and not p.posture.velocity.any()
+    )  # fmt: skip
+    assert shift - centred == round(0.5 / PERIOD_S)
+    assert all(d.source is Source.FACE for _, d in rounds[:shift])
+
+
+def test_learning_module_leads_beyond_the_first_view():
+    unseen = np.array([0.6, 0.1])
+    world = AngleWorld(objects=[(-0.2, 0.0), unseen])
+    world.learner = lambda posture: unseen - posture
+    rounds = run(make_cycle(p_lm=1.0), world, 20)
+    shift = rounds[first(rounds, Phase.SHIFT)][1]
+    assert shift.source is Source.LEARNING_MODULE
+    assert shift.target == pytest.approx(unseen)
+    done = next(i for i, (_, d) in enumerate(rounds) if d.trials == 1)
+    assert rounds[done][0].fixation == pytest.approx(unseen)
+
+
+def test_visual_feedback_stands_in_while_the_learner_has_no_answer():
+    world = AngleWorld(objects=[(0.25, 0.0)])
+    rounds = run(make_cycle(p_lm=1.0), world, 10)
+    assert rounds[first(rounds, Phase.SHIFT)][1].source is Source.VISUAL_FEEDBACK
+
+
+def shifts_by_learner(**config):
+    """Trials of five shifts each without any fixation, shape (trials, 5): did the LM lead?"""
+    world = AngleWorld(objects=[])
+    world.learner = lambda posture: np.zeros(2)
+    cycle = make_cycle(p_lm=0.3, max_shifts=5, dwell_s=0.0, **config)
+    draws, seen = [], None
+    for _, decision in run(cycle, world, 4000):
+        now = (decision.trials, decision.shifts)
+        if decision.phase is Phase.SHIFT and now != seen:
+            draws.append(decision.source is Source.LEARNING_MODULE)
+            seen = now
+    return np.reshape(draws[: len(draws) // 5 * 5], (-1, 5))
+
+
+def test_source_is_drawn_at_every_shift_at_the_rate_of_the_gate():
+    led = shifts_by_learner()
+    assert led.size > 2000
+    assert led.mean() == pytest.approx(0.3, abs=4 * np.sqrt(0.21 / led.size))
+    assert set(led.sum(axis=1)) > {1, 2, 3}, 'not once a trial'
+
+
+def test_source_may_be_drawn_once_a_trial():
+    led = shifts_by_learner(source_drawn='first_shift')
+    assert led.mean() == pytest.approx(0.3, abs=4 * np.sqrt(0.21 / len(led)))
+    assert set(led.sum(axis=1)) == {0, 5}
+
+
+def test_same_seed_draws_the_same_sources():
+    def sources(seed):
+        world = AngleWorld(objects=[(0.25, 0.0)])
+        world.learner = lambda posture: np.array([-0.1, 0.0])
+        rounds = run(make_cycle(p_lm=0.5, seed=seed), world, 200)
+        return [decision.source for _, decision in rounds]
+
+    assert sources(3) == sources(3) != sources(4)
+
+
+def test_trial_without_fixation_is_given_up_after_max_shifts():
+    world = AngleWorld(objects=[])
+    world.learner = lambda posture: np.array([0.05, 0.0])
+    rounds = run(make_cycle(p_lm=1.0, max_shifts=3), world, 40)
+    done = next(i for i, (_, d) in enumerate(rounds) if d.trials == 1)
+    assert max(d.shifts for _, d in rounds[:done]) == 2
+    shifted = {d.target[0].round(6) for _, d in rounds[:done] if d.phase is Phase.SHIFT}
+    assert shifted == {0.05, 0.10, 0.15}
+    assert rounds[done][1].target == pytest.approx((0, 0))
+    assert rounds[done][1].phase is Phase.LOOK
+
+
+@pytest.mark.parametrize('dead_images', [0, 1, 4])
+def test_shift_is_never_judged_arrived_before_the_head_has_moved(dead_images):
+    """While the servo has not begun, the head stands still, and on the wrong object."""
+    world = AngleWorld(objects=[(0.25, 0.0), (0.09, 0.0)], dead_images=dead_images)
+    cycle = make_cycle(settle_timeout_s=3.0)
+    rounds = run(cycle, world, 30)
+    done = next(i for i, (_, d) in enumerate(rounds) if d.trials == 1)
+    percept = rounds[done][0]
+    assert percept.posture.position == pytest.approx((0.25, 0.0))
+    assert not percept.posture.velocity.any()
+
+
+def test_shift_that_cannot_arrive_is_judged_after_the_settle_timeout():
+    world = AngleWorld(objects=[])
+    world.learner = lambda posture: np.array([0.5, 0.0])
+    cycle = make_cycle(p_lm=1.0, settle_timeout_s=0.8)
+    rounds = run(cycle, world, 5)
+    stuck = [cycle.step(world.percept())]
+    assert stuck[0].phase is Phase.SHIFT
+    start = next(p.posture.stamp_ns for p, d in rounds if d.phase is Phase.SHIFT)
+    world.position, world.velocity = np.array([0.1, 0.0]), np.zeros(2)  # against a wall
+    while (decision := cycle.step(world.percept())).shifts == 0:
+        world.stamp_ns += 10**8
+    assert world.stamp_ns - start == 8 * 10**8
+    assert decision.target == pytest.approx((0.6, 0.0)), 'the next shift starts where it stands'
+
+
+def test_lost_face_is_searched_and_found():
+    world = AngleWorld(objects=[], face=(0.55, 0.0))
+    rounds = run(make_cycle(search_after_s=1.0, search_period_s=8.0), world, 60)
+    assert phases(rounds)[:3] == [Phase.LOOK, Phase.SEARCH, Phase.LOOK]
+    assert first(rounds, Phase.SEARCH) == 10, 'not before search_after_s'
+    found = next(i for i, (p, _) in enumerate(rounds) if p.face_delta is not None)
+    assert rounds[found][1].phase is Phase.LOOK
+    assert rounds[found][1].target == pytest.approx((0.55, 0.0))
+    assert world.position == pytest.approx((0.55, 0.0), abs=CONFIG.look_tolerance_rad)
+
+
+def test_sweep_of_the_search_covers_both_sides_of_home_and_keeps_its_amplitude():
+    world = AngleWorld(face=None)
+    cycle = make_cycle(home_pan_rad=0.2, search_pan_rad=0.5, search_tilt_rad=0.1)
+    targets = np.array([d.target for _, d in run(cycle, world, 120) if d.phase is Phase.SEARCH])
+    assert targets.min(axis=0) == pytest.approx((-0.3, -0.1), abs=0.01)
+    assert targets.max(axis=0) == pytest.approx((0.7, 0.1), abs=0.01)
+
+
+def test_head_looks_where_the_face_was_before_it_searches():
+    world = AngleWorld(face=(0.2, 0.0))
+    cycle = make_cycle(dwell_s=60.0)
+    run(cycle, world, 10)
+    world.face = None
+    rounds = run(cycle, world, 10)
+    assert {d.phase for _, d in rounds} == {Phase.LOOK}
+    assert all(d.target == pytest.approx((0.2, 0.0)) for _, d in rounds)
+    assert run(cycle, world, 1)[0][1].phase is Phase.SEARCH
+
+
+def test_blink_of_the_detector_is_no_dwelling():
+    """A face that is missed and seen again must be dwelt on anew."""
+    world = AngleWorld(objects=[(0.25, 0.0)])
+    cycle = make_cycle(dwell_s=0.3, search_after_s=1.0)
+    run(cycle, world, 2)
+    face, world.face = world.face, None
+    run(cycle, world, 5)
+    world.face = face
+    assert [d.phase for _, d in run(cycle, world, 4)] == [Phase.LOOK] * 3 + [Phase.SHIFT]
+
+
+def test_long_dwelling_is_no_missing():
+    world = AngleWorld()
+    cycle = make_cycle(dwell_s=60.0, search_after_s=1.0)
+    run(cycle, world, 30)
+    world.face = None
+    assert run(cycle, world, 1)[0][1].phase is Phase.LOOK
+
+
+def test_moving_caregiver_is_followed():
+    world = AngleWorld()
+    cycle = make_cycle(dwell_s=0.5)
+    for _ in range(30):
+        world.face = world.face + np.array([0.05, 0.0])
+        run(cycle, world, 1)
+    assert cycle.phase is Phase.LOOK, 'never still, so never dwelt on'
+    assert world.position == pytest.approx(world.face)
+
+
+def test_home_gives_up_the_trial_and_looks_from_there():
+    world = AngleWorld(objects=[(0.25, 0.0)])
+    cycle = make_cycle(home_pan_rad=-0.3, home_tilt_rad=0.1)
+    run(cycle, world, 4)
+    assert cycle.phase is Phase.SHIFT
+    cycle.go_home()
+    rounds = run(cycle, world, 10)
+    assert rounds[0][1].phase is Phase.HOME
+    assert rounds[0][1].target == pytest.approx((-0.3, 0.1))
+    arrived = first(rounds, Phase.LOOK)
+    assert rounds[arrived][0].posture.position == pytest.approx((-0.3, 0.1))
+    assert cycle.trials == 0
+
+
+def test_restart_gives_up_the_shift_and_looks_where_the_caregiver_was():
+    world = AngleWorld(objects=[(0.25, 0.0)])
+    cycle = make_cycle()
+    run(cycle, world, 4)
+    world.face, world.position, world.velocity = None, np.array([0.4, 0.2]), np.zeros(2)
+    cycle.restart()
+    decision = cycle.step(world.percept())
+    assert decision.phase is Phase.LOOK
+    assert decision.shifts == 0
+    assert decision.target == pytest.approx((0.0, 0.0))
+
+
+def test_order_to_turn_home_outlives_a_restart():
+    cycle = make_cycle()
+    cycle.go_home()
+    cycle.restart()
+    assert cycle.step(AngleWorld().percept()).phase is Phase.HOME
+
+
+def test_posture_is_kept_when_nothing_was_ever_seen():
+    world = AngleWorld(face=None)
+    world.position = np.array([0.3, -0.1])
+    decision = make_cycle().step(world.percept())
+    assert decision.target == pytest.approx((0.3, -0.1))
+    assert decision.source is Source.NONE

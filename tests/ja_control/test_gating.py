@@ -1,0 +1,32 @@
+"""Fig. 6 (a): the rate at which the learning module is selected."""
+
+import pytest
+
+from ja_control.core.gating import Gating, GatingConfig
+
+
+def test_sigmoid_of_the_paper():
+    gating = Gating(GatingConfig(sigmoid_centre_trials=12e4, sigmoid_slope_trials=3e4))
+    assert gating.p_lm(120_000) == pytest.approx(0.5)
+    assert gating.p_lm(150_000) == pytest.approx(0.7310586)  # 1 / (1 + 1/e)
+    assert gating.p_lm(0) == pytest.approx(0.0179862)  # 1 / (1 + e^4)
+    assert gating.p_lm(300_000) == pytest.approx(0.9975274)
+
+
+def test_it_grows_and_never_leaves_its_limits():
+    gating = Gating(GatingConfig(p_lm_max=0.8))
+    values = [gating.p_lm(trials) for trials in range(0, 400_000, 10_000)]
+    assert values == sorted(values)
+    assert gating.p_lm(120_000) == pytest.approx(0.4)
+    assert gating.p_lm(10**12) == pytest.approx(0.8)
+
+
+def test_step_so_steep_that_the_exponential_would_overflow():
+    gating = Gating(GatingConfig(sigmoid_centre_trials=1e9, sigmoid_slope_trials=1e-3))
+    assert gating.p_lm(0) == 0.0
+    assert gating.p_lm(2 * 10**9) == 1.0
+
+
+def test_constant():
+    gating = Gating(GatingConfig(gating='constant', p_lm_max=0.3))
+    assert gating.p_lm(0) == gating.p_lm(10**6) == 0.3

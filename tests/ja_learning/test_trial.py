@@ -1,0 +1,93 @@
+"""A trial, cut out of looks, rests and fixations that nobody announces."""
+
+import numpy as np
+import pytest
+
+from ja_learning.core.trial import FACE_SHAPE, TrialRecorder
+
+FACE = np.full(FACE_SHAPE, 100, np.uint8)
+OTHER_FACE = np.full(FACE_SHAPE, 200, np.uint8)
+CAREGIVER, FIRST, SECOND = (0.0, 0.0), (0.2, 0.1), (0.5, 0.2)
+BALL = (0.55, 0.25)
+
+
+@pytest.fixture
+def recorder():
+    return TrialRecorder(same_within_rad=0.02)
+
+
+def test_trial_has_the_posture_where_each_shift_began(recorder):
+    recorder.look(FACE, CAREGIVER)
+    recorder.rest(FIRST)
+    recorder.rest(SECOND)
+    trial = recorder.fixate(SECOND, BALL)
+    assert trial.face is FACE
+    assert trial.postures == pytest.approx(np.array([CAREGIVER, FIRST])), 'no shift began at last'
+    assert trial.fixation == pytest.approx(BALL)
+    assert trial.displacements() == pytest.approx(np.array([(0.55, 0.25), (0.35, 0.15)]))
+
+
+def test_fixation_may_come_before_or_after_the_rest_of_its_image(recorder):
+    """Two topics carry them: the order is nobody's."""
+    recorder.look(FACE, CAREGIVER)
+    before = recorder.fixate(FIRST, BALL)
+    recorder.rest(FIRST)
+    assert recorder.face is None
+    recorder.look(FACE, CAREGIVER)
+    recorder.rest(FIRST)
+    after = recorder.fixate(FIRST, BALL)
+    assert np.array_equal(before.postures, after.postures)
+    assert before.postures == pytest.approx(np.array([CAREGIVER]))
+
+
+def test_repeated_postures_count_once(recorder):
+    recorder.look(FACE, CAREGIVER)
+    for jitter in (0.0, 0.01, -0.01, 0.005):
+        recorder.rest((FIRST[0] + jitter, FIRST[1]))
+    assert len(recorder.fixate(SECOND, BALL).postures) == 2
+
+
+def test_trial_begins_with_the_last_image_of_the_look(recorder):
+    recorder.look(FACE, (0.1, 0.0))
+    recorder.look(OTHER_FACE, CAREGIVER)
+    trial = recorder.fixate(FIRST, BALL)
+    assert trial.face is OTHER_FACE
+    assert trial.postures == pytest.approx(np.array([CAREGIVER]))
+
+
+def test_look_without_fixation_leaves_nothing(recorder):
+    recorder.look(FACE, CAREGIVER)
+    recorder.rest(FIRST)
+    recorder.look(OTHER_FACE, CAREGIVER)
+    assert len(recorder.fixate(SECOND, BALL).postures) == 1
+
+
+def test_only_the_first_fixation_ends_a_trial(recorder):
+    recorder.look(FACE, CAREGIVER)
+    assert recorder.fixate(FIRST, BALL) is not None
+    assert recorder.fixate(FIRST, BALL) is None
+    recorder.rest(SECOND)
+    assert recorder.fixate(SECOND, BALL) is None
+
+
+def test_fixation_without_a_look_is_no_trial(recorder):
+    recorder.rest(FIRST)
+    assert recorder.fixate(FIRST, BALL) is None
+
+
+def test_what_stands_before_the_face_during_the_look_ends_no_trial(recorder):
+    recorder.look(FACE, CAREGIVER)
+    assert recorder.fixate(CAREGIVER, (0.03, 0.0)) is None
+    assert recorder.fixate(FIRST, BALL) is not None, 'the trial went on'
+
+
+def test_forgotten_trial_is_over(recorder):
+    recorder.look(FACE, CAREGIVER)
+    recorder.forget()
+    assert recorder.fixate(FIRST, BALL) is None
+
+
+@pytest.mark.parametrize('face', [np.zeros((25, 30), np.uint8), np.zeros(FACE_SHAPE)])
+def test_picture_that_is_no_face_is_refused(recorder, face):
+    with pytest.raises(ValueError, match='30 rows x 25 columns'):
+        recorder.look(face, CAREGIVER)

@@ -1,0 +1,119 @@
+"""A bench for one node: a peer speaks to it over real topics and keeps all that it says."""
+
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from ja_common.time_codec import to_time
+from ja_common.topics import JOINT_STATES, Topic
+from ros_testing import spin_until
+
+
+class NodeBench:
+    """The node under test (`node`) and its peer, spun by one executor in the test's own domain."""
+
+    def __init__(
+        self,
+        context: Context,
+        make_node: Callable[..., Node],
+        says: list[Topic] = (),
+        hears: list[Topic] = (),
+        **parameters: Any,
+    ) -> None:
+        overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+        self.node = make_node(context=context, parameter_overrides=overrides)
+        self.peer = rclpy.create_node('peer', context=context)
+        self.executor = SingleThreadedExecutor(context=context)
+        self.executor.add_node(self.node)
+        self.executor.add_node(self.peer)
+        self._heard: dict[str, list] = defaultdict(list)
+        self._publishers = {
+            topic: self.peer.create_publisher(topic.type, topic.name, topic.says) for topic in says
+        }
+        for topic in hears:
+            keep = self._heard[topic.name].append
+            self.peer.create_subscription(topic.type, topic.name, keep, topic.hears)
+        ours = {f'/{topic.name}'.replace('//', '/') for topic in hears}
+        answering = [p for p in self.node.publishers if p.topic_name in ours]
+        matched = [*self._publishers.values(), *answering]
+        self.wait(lambda: all(p.get_subscription_count() for p in matched))
+
+    def wait(self, condition: Callable[[], object]) -> None:
+        """Spin until the condition holds."""
+        spin_until(self.executor, condition)
+
+    def say(self, topic: Topic, message: Any) -> None:
+        """The peer publishes."""
+        self._publishers[topic].publish(message)
+
+    def say_posture(self, stamp_ns: int, pan: float = 0.0, tilt: float = 0.0, **more: Any) -> None:
+        """The rig publishes a joint state; the head stands still unless `velocity` is given."""
+        message = joint_state(stamp_ns, pan, tilt)
+        message.velocity = [0.0, 0.0]
+        for name, value in more.items():
+            setattr(message, name, value)
+        self.say(JOINT_STATES, message)
+
+    def heard(self, topic: Topic) -> list:
+        """All that the peer has heard on a topic."""
+        return self._heard[topic.name]
+
+    def next(self, topic: Topic, count: int = 1) -> Any:
+        """Wait for `count` more messages on a topic; the last of them."""
+        wanted = len(self.heard(topic)) + count
+        self.wait(lambda: len(self.heard(topic)) >= wanted)
+        return self.heard(topic)[wanted - 1]
+
+    def call(self, service_type: Any, name: str, **fields: Any) -> Any:
+        """Call a service of the node; its response."""
+        client = self.peer.create_client(service_type, name)
+        self.wait(client.service_is_ready)
+        future = client.call_async(service_type.Request(**fields))
+        self.wait(future.done)
+        return future.result()
+
+    def set_parameter(self, name: str, value: Any) -> Any:
+        """Set a parameter as another process would; the result with its reason."""
+        client = AsyncParameterClient(self.peer, self.node.get_fully_qualified_name())
+        self.wait(client.services_are_ready)
+        future = client.set_parameters([Parameter(name, value=value)])
+        self.wait(future.done)
+        return future.result().results[0]
+
+    def complaint(self) -> str:
+        """What the node's health complains of; 'OK' when nothing."""
+        return self.node.health.report(time.monotonic()).message
+
+    def wait_for_complaint(self, text: str) -> None:
+        """Spin until the node complains with this text; the complaints so far otherwise."""
+        seen = set()
+
+        def complained() -> bool:
+            seen.add(self.complaint())
+            return any(text in complaint for complaint in seen)
+
+        try:
+            self.wait(complained)
+        except AssertionError:
+            raise AssertionError(f'no complaint with {text!r}, only {seen}') from None
+
+
+def header(stamp_ns: int, frame_id: str = 'eye') -> Header:
+    """A header with a stamp in nanoseconds."""
+    return Header(stamp=to_time(stamp_ns), frame_id=frame_id)
+
+
+def joint_state(stamp_ns: int, *angles: float) -> JointState:
+    """(pan, tilt) at a stamp [ns]; an empty message, 'nothing to say', without angles."""
+    names = ['pan', 'tilt'] if angles else []
+    return JointState(header=header(stamp_ns), name=names, position=list(angles))
