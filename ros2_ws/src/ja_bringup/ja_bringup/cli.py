@@ -35,18 +35,26 @@ TimeOption = Annotated[float, typer.Option('--time', min=0.0, help='End after so
 @app.command()
 def demo(
     context: typer.Context,
-    trials: Annotated[int, typer.Option(min=1, help='End after so many trials.')] = 1500,
-    time_s: TimeOption = 150.0,
+    trials: Annotated[int, typer.Option(min=1, help='Practise for so many trials.')] = 1500,
+    time_s: Annotated[
+        float, typer.Option('--time', min=0.0, help='Practise for so many seconds at most.')
+    ] = 120.0,
+    exam_trials: Annotated[
+        int,
+        typer.Option('--exam', min=0, help='Trials of the learner alone at the end; 0: no exams.'),
+    ] = 100,
     seed: Annotated[int, typer.Option(min=0, help='Seed of the world and of the robot.')] = 0,
     scene: Annotated[str, typer.Option(help='Scene of the sim, by name or file.')] = 'easy',
     one_process: OneProcess = False,
     on_death: OnDeathOption = OnDeathChoice.stop,
 ) -> None:
     """Watch the simulated head learn to follow the caregiver's gaze."""
+    from ja_bringup.course import standard_course
     from ja_bringup.demo import run_demo
 
     graph = with_arguments(sim_graph(seed, {'scene': scene}), context.obj or [])
-    sys.exit(run_demo(graph, trials, time_s, one_process, on_death.value, context.obj or []))
+    stages = standard_course(trials, time_s, exam_trials)
+    sys.exit(run_demo(graph, stages, one_process, on_death.value, context.obj or []))
 
 
 @app.command()

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from ja_bringup.course import Course, Stage
 from ja_bringup.graph import NodeSpec
 from ja_bringup.progress import WINDOW_TRIALS, ProgressNode, rate_text
 from ja_bringup.report import draw_png, write_csv
@@ -11,24 +12,30 @@ from ja_bringup.supervisor import OnDeath
 
 def run_demo(
     graph: Sequence[NodeSpec],
-    trials: int,
-    time_s: float,
+    stages: Sequence[Stage],
     one_process: bool,
     on_death: OnDeath,
     arguments: Sequence[str],
 ) -> int:
-    """Run until so many trials or seconds have passed; summary, curve and exit code."""
+    """Lead the graph through the stages of a course; summary, curve and exit code."""
     folder = new_run_folder('demo')
+    course: list[Course] = []
+
+    def over(node: ProgressNode) -> bool:
+        if not course:
+            course.append(Course(node, stages))
+        return course[0].tick()
+
     code, watcher = run_graph(
         graph,
         folder,
         'Joint attention, simulated head',
-        lambda node: len(node.curve.records) >= trials or node.elapsed_s >= time_s,
+        over,
         one_process=one_process,
         on_death=on_death,
         arguments=arguments,
     )
-    for line in summary(watcher):
+    for line in summary(watcher, stages):
         print(line)
     if watcher.curve.records:
         print(f'success curve: {write_csv(watcher.curve, folder)}')
@@ -36,17 +43,26 @@ def run_demo(
     return code
 
 
-def summary(watcher: ProgressNode) -> list[str]:
+def summary(watcher: ProgressNode, stages: Sequence[Stage]) -> list[str]:
     """The run in a few lines."""
-    records = watcher.curve.records
-    if not records:
+    curve = watcher.curve
+    if not curve.records:
         return ['no trial was finished']
     seconds = max(watcher.elapsed_s, 1e-9)
-    first = watcher.curve.rate(slice(WINDOW_TRIALS))
-    last = watcher.curve.rate(slice(-WINDOW_TRIALS, None))
-    return [
-        f'{len(records)} trials in {seconds:.0f} s: {len(records) / seconds:.1f} trials/s, '
-        f'{watcher.images / seconds:.0f} images/s',
-        f'success rate, first trials: {rate_text(first)} (95 % interval)',
-        f'success rate, last trials:  {rate_text(last)}, p(LM) {records[-1].p_lm:.2f}',
+    lines = [
+        f'{len(curve.records)} trials in {seconds:.0f} s: {len(curve.records) / seconds:.1f} '
+        f'trials/s, {watcher.images / seconds:.0f} images/s'
     ]
+    for stage in stages:
+        if stage.learner_alone:
+            parts = {f'{stage.name}, learner alone': slice(None)}
+        else:
+            parts = {
+                f'{stage.name}, first trials': slice(WINDOW_TRIALS),
+                f'{stage.name}, last trials': slice(-WINDOW_TRIALS, None),
+            }
+        lines += [
+            f'success, {name + ":":28} {rate_text(curve.rate(part, stage.name))}'
+            for name, part in parts.items()
+        ]
+    return [*lines, f'chance, one object of {watcher.objects}: {1 / watcher.objects:.2f}']

@@ -30,6 +30,7 @@ class ProgressNode(GraphNode):
         self.gate: Mapping[str, str] = {}
         self.complaints: dict[str, str] = {}
         self.images = 0
+        self.objects = 1
         self.began_s = math.nan
         self._image_times_s: deque[float] = deque(maxlen=200)
         self.hear(GATE_STATUS, self._on_gate_status)
@@ -58,7 +59,9 @@ class ProgressNode(GraphNode):
         self._image_times_s.append(now)
 
     def _on_score(self, message: DiagnosticStatus) -> None:
-        success = _values(message).get('last') == 'success'
+        values = _values(message)
+        success = values.get('last') == 'success'
+        self.objects = int(values.get('objects', '1'))
         self.curve.add(success, float(self.gate.get('p_lm', 'nan')), self.elapsed_s)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
@@ -72,6 +75,7 @@ class ProgressNode(GraphNode):
         """What to show, in this order."""
         facts = {
             'trials': str(len(self.curve.records) or self.gate.get('trials', '0')),
+            'stage': self.curve.stage or '-',
             'success rate, recent': rate_text(self.curve.rate(slice(-WINDOW_TRIALS, None))),
             'phase': self.gate.get('phase', 'waiting for the first image'),
             'source': self.gate.get('source', '-'),

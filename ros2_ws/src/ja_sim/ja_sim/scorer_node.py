@@ -78,7 +78,7 @@ class ScorerNode(GraphNode):
         if self._csv_file is not None:
             self._csv.writerow(asdict(outcome))
         rates = self._score.rates()
-        values: dict[str, str] = {}
+        values = {'objects': str(outcome.objects)}
         for name, rate in rates.items():
             low, high = rate.interval
             values |= {

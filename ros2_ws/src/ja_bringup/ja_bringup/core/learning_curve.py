@@ -10,12 +10,16 @@ from ja_sim.core.score import Rate
 
 @dataclass(frozen=True)
 class TrialRecord:
-    """One scored trial. `p_lm`: probability, 0-1, that its shifts followed the learner."""
+    """One scored trial. `p_lm`: probability, 0-1, that its shifts followed the learner.
+
+    `stage`: part of the course that it belongs to; '' for none.
+    """
 
     trial: int
     success: bool
     p_lm: float
     elapsed_s: float
+    stage: str = ''
 
 
 class LearningCurve:
@@ -23,14 +27,20 @@ class LearningCurve:
 
     def __init__(self) -> None:
         self.records: list[TrialRecord] = []
+        self.stage = ''
 
     def add(self, success: bool, p_lm: float, elapsed_s: float) -> None:
         """The next trial has ended."""
-        self.records.append(TrialRecord(len(self.records) + 1, success, p_lm, elapsed_s))
+        number = len(self.records) + 1
+        self.records.append(TrialRecord(number, success, p_lm, elapsed_s, self.stage))
 
-    def rate(self, trials: slice = slice(None)) -> Rate:
-        """Success rate among some of the trials."""
-        chosen = self.records[trials]
+    def of_stage(self, stage: str) -> list[TrialRecord]:
+        """The trials of one part of the course."""
+        return [record for record in self.records if record.stage == stage]
+
+    def rate(self, trials: slice = slice(None), stage: str | None = None) -> Rate:
+        """Success rate among some of the trials, of one stage if one is named."""
+        chosen = (self.records if stage is None else self.of_stage(stage))[trials]
         return Rate(sum(record.success for record in chosen), len(chosen))
 
     def recent_rates(self, window: int) -> NDArray[np.float64]:
