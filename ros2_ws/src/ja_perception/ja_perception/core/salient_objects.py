@@ -21,11 +21,12 @@ from ja_perception.core.features import (
     edge_map,
     motion_map,
 )
-from ja_perception.core.grouping import Grouping, GroupingConfig, merged
+from ja_perception.core.grouping import Grouping, GroupingConfig, merged, texture_window
 from ja_perception.core.object_tracking import ObjectTracker, TrackingConfig
 
-# An area of bright colour that fills the gazing area of Eq. 3 has f_col = 1.
+# The area within d_th of the centre (Eq. 3) at unit focal length: the measure of f_col and f_mot.
 _GAZING_AREA = math.pi * math.tan(WIDTH_SIXTH) ** 2
+_MOTION_WIDTH_PX = 160
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,11 @@ class InterestConfig:
 
 @dataclass(frozen=True)
 class SalientObject:
-    """An object in pixels of the image that was given, with the features of Eq. 1 (each 0-1)."""
+    """An object in pixels of the image that was given, with the features of Eq. 1 (each 0-1).
+
+    ``f_col``: area A of its bright colour, ``f_mot``: area A in motion, both as A / (A + G), where
+    G is the area within d_th of the centre. ``f_edg``: share of edge pixels in its box.
+    """
 
     box: Box
     track_id: int
@@ -104,21 +109,25 @@ class SalientObjects:
         colour = colour_map(work, self._features)
         grey = cv2.cvtColor(work, cv2.COLOR_RGB2GRAY)
         edges = edge_map(grey, self._features)
-        moving = self._motion(grey, work_camera, posture, position, stamp_ns)
+        moving = self._motion(grey, work_camera, posture, stamp_ns)
         for head in heads:
             for feature in (colour.bright, edges, moving):
                 _blank(feature, _rescaled(head, scale))
 
         interest = self._interest
-        boxes = merged(
+        regions = merged(
             self._grouping.by_colour(colour) if interest.alpha_col else [],
             self._grouping.by_motion(moving) if interest.alpha_mot else [],
             self._grouping.by_texture(edges) if interest.alpha_edg else [],
         )
-        amounts = [_amounts(feature, boxes) for feature in (colour.bright, edges, moving)]
-        f_col = np.minimum(1, amounts[0] / (_GAZING_AREA * work_camera.fx * work_camera.fy))
-        areas = np.array([box.area for box in boxes])
-        f_edg, f_mot = (np.minimum(1, amount / areas) for amount in amounts[1:])
+        boxes = [region.box for region in regions]
+        gazing_px = _GAZING_AREA * work_camera.fx * work_camera.fy
+        # x / (1 + x): grows with the area but stays below 1, so that no two sizes are equal.
+        bright = np.array([region.bright_px for region in regions]) / gazing_px
+        moved = _amounts(moving, boxes) / gazing_px
+        judged = np.array([max(box.area, texture_window(edges) ** 2) for box in boxes])
+        f_col, f_mot = bright / (1 + bright), moved / (1 + moved)
+        f_edg = np.minimum(1, _amounts(edges, boxes) / judged)
         saliency = (
             interest.alpha_col * f_col + interest.alpha_edg * f_edg + interest.alpha_mot * f_mot
         )
@@ -132,23 +141,25 @@ class SalientObjects:
         return sorted(objects, key=lambda o: -o.score)
 
     def _motion(
-        self,
-        grey: Mask,
-        camera: CameraModel,
-        posture: Posture | None,
-        position: NDArray[np.float64],
-        stamp_ns: int,
+        self, grey: Mask, camera: CameraModel, posture: Posture | None, stamp_ns: int
     ) -> Mask:
-        before, self._before = self._before, _Before(grey, position, stamp_ns)
+        """The motion map, of the size of ``grey``, judged on a smaller image: motion is coarse."""
+        height, width = grey.shape
+        small = _scaled(grey, min(1.0, _MOTION_WIDTH_PX / width))
+        camera = camera.resized(small.shape[1], small.shape[0])
+        position = np.zeros(2) if posture is None else posture.position
+        before, self._before = self._before, _Before(small, position, stamp_ns)
         slow = posture is None or posture.is_still(self._interest.motion_below_rad_s)
-        self.motion_judged = (
-            before is not None and before.grey.shape == grey.shape and stamp_ns > before.stamp_ns
-        ) and slow
+        comparable = (
+            before is not None and before.grey.shape == small.shape and before.stamp_ns < stamp_ns
+        )
+        self.motion_judged = slow and comparable
         if before is None or not self.motion_judged:
             return np.zeros_like(grey)
         homography = rotation_homography(camera, position, before.position)
         expected, seen_before = expected_image(before.grey, homography)
-        return motion_map(grey, expected, seen_before, self._features)
+        moving = motion_map(small, expected, seen_before, self._features)
+        return cv2.resize(moving, (width, height), interpolation=cv2.INTER_NEAREST)
 
 
 def _scaled(image: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
