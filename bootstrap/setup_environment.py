@@ -72,7 +72,7 @@ class Environment:
         """The quick way, without starting an interpreter."""
         wanted = self.environ.get('JA_PYTHON')
         recorded = self._stamp().get('python', {})
-        if not recorded or not os.path.exists(self.python):
+        if not recorded:
             return False
         if wanted and shutil.which(wanted) != recorded.get('asked'):
             return False
@@ -170,6 +170,9 @@ class Environment:
         return f'{" ".join(command[:4])} ... failed: {last} (log: {self.log})'
 
     def _stamp(self) -> dict:
+        """What was done; nothing when the interpreter is gone (its link leads nowhere)."""
+        if not os.path.exists(self.python):
+            return {}
         try:
             stamp = json.loads((self.folder / STAMP).read_text())
         except (OSError, ValueError):

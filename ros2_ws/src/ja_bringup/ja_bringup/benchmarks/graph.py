@@ -8,9 +8,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from scipy.stats import bootstrap
 
 from ja_bringup.bench import Row
+from ja_bringup.benchmarks._rows import percentile_99, row
 from ja_bringup.graph import NodeSpec, sim_graph, with_arguments
 from ja_bringup.progress import ProgressNode
 from ja_bringup.run import run_graph
@@ -59,8 +59,8 @@ class _Watch:
         edges = np.searchsorted(times, np.arange(times[0], times[-1], BLOCK_S))
         seconds = np.diff(times[edges])
         return {
-            'image steps': _mean_row(np.diff(images[edges]) / seconds, 'images/s'),
-            'trials': _mean_row(np.diff(trials[edges]) / seconds, 'trials/s'),
+            'image steps': row(np.diff(images[edges]) / seconds, 'images/s'),
+            'trials': row(np.diff(trials[edges]) / seconds, 'trials/s'),
             'start to first command': {
                 'value': self._first_image_s - self._began_s,
                 'unit': 's',
@@ -95,9 +95,9 @@ class _Stopwatch:
         rounds = [r for r in self._arrived_s.values() if len(r) == len(HOPS) + 1]
         for topic in HOPS:
             delays_ms = 1e3 * np.array([r[topic.name] - r[IMAGE.name] for r in rounds])
-            rows[f'{IMAGE.name} to {topic.name}, median'] = _row(delays_ms, 'ms', np.median)
-            rows[f'{IMAGE.name} to {topic.name}, 99th percentile'] = _row(
-                delays_ms, 'ms', _percentile_99
+            rows[f'{IMAGE.name} to {topic.name}, median'] = row(delays_ms, 'ms', np.median)
+            rows[f'{IMAGE.name} to {topic.name}, 99th percentile'] = row(
+                delays_ms, 'ms', percentile_99
             )
         return rows
 
@@ -116,24 +116,3 @@ def _run(
         code, _ = run_graph(graph, Path(folder), 'bench graph', done, one_process=one_process)
     if code:
         raise ConfigError('the graph did not run to the end of the measurement')
-
-
-def _percentile_99(values: np.ndarray, axis: int = -1) -> Any:
-    return np.percentile(values, 99, axis=axis)
-
-
-def _mean_row(values: np.ndarray, unit: str) -> Row:
-    return _row(values, unit, np.mean)
-
-
-def _row(values: np.ndarray, unit: str, statistic: Callable[..., Any]) -> Row:
-    """A statistic with its 95 % interval by bootstrap (percentile, seeded: repeatable)."""
-    found = bootstrap(
-        (values,), statistic, method='percentile', n_resamples=2000, rng=np.random.default_rng(0)
-    ).confidence_interval
-    return {
-        'value': float(statistic(values)),
-        'unit': unit,
-        'n': len(values),
-        'interval': [float(found.low), float(found.high)],
-    }

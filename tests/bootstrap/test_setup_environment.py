@@ -1,0 +1,197 @@
+"""The set-up's course with the commands recorded instead of run, on a checkout of its own."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bootstrap import machine, setup_environment
+from bootstrap.machine import clean_environ, probe_python
+from bootstrap.plan import BootstrapError, Python
+from bootstrap.setup_environment import STAMP, Environment
+
+ROOT = Path(__file__).parents[2]
+
+
+class Recorded(Environment):
+    """Does not run anything; `fail_at` is a word of the command that is interrupted."""
+
+    def __init__(self, root: Path, environ: dict[str, str] | None = None) -> None:
+        super().__init__(root, environ or {}, say=lambda _: None)
+        self.commands: list[str] = []
+        self.fail_at = ''
+
+    def _run(self, command, environ=None):
+        text = ' '.join(command)
+        if self.fail_at and self.fail_at in text:
+            raise KeyboardInterrupt
+        self.commands.append(text)
+        if '-m venv' in text:
+            python = Path(self.python)
+            python.parent.mkdir(parents=True, exist_ok=True)
+            python.touch()
+
+    def did(self) -> list[str]:
+        """The words that tell the steps apart, in order; and forget them."""
+        words = ('-m venv', 'ros.lock', 'base.lock', '-e ', 'dev.lock', 'apt-get')
+        found = [word for text in self.commands for word in words if word in text]
+        self.commands = []
+        return found
+
+
+@pytest.fixture
+def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    package = tmp_path / 'ros2_ws' / 'src' / 'ja_one'
+    package.mkdir(parents=True)
+    for name in ('setup.py', 'setup.cfg'):
+        (package / name).touch()
+    (tmp_path / 'requirements').mkdir()
+    for name in ('ros', 'base', 'dev'):
+        (tmp_path / 'requirements' / f'{name}.lock').write_text(name)
+    monkeypatch.setattr(machine, 'missing_system_packages', lambda python: [])
+    monkeypatch.setattr(
+        machine, 'pythons', lambda environ, existing: [Python('python3.12', (3, 12), True)]
+    )
+    return tmp_path
+
+
+def test_all_the_steps_once_and_then_none(checkout):
+    environment = Recorded(checkout)
+    environment.prepare()
+    assert environment.did() == ['-m venv', 'ros.lock', 'base.lock', '-e ']
+    environment.prepare()
+    assert environment.did() == []
+
+
+def test_tests_need_one_step_more(checkout):
+    environment = Recorded(checkout)
+    environment.prepare()
+    environment.did()
+    environment.prepare(dev=True)
+    assert environment.did() == ['dev.lock']
+    environment.prepare()
+    assert environment.did() == []
+
+
+def test_a_changed_lock_is_installed_again(checkout):
+    environment = Recorded(checkout)
+    environment.prepare()
+    environment.did()
+    (checkout / 'requirements' / 'base.lock').write_text('newer')
+    environment.prepare()
+    assert environment.did() == ['base.lock']
+
+
+def test_an_interrupted_setup_goes_on_where_it_was(checkout):
+    environment = Recorded(checkout)
+    environment.fail_at = 'base.lock'
+    with pytest.raises(KeyboardInterrupt):
+        environment.prepare()
+    assert environment.did() == ['-m venv', 'ros.lock']
+    environment.fail_at = ''
+    environment.prepare()
+    assert environment.did() == ['base.lock', '-e ']
+
+
+def test_a_damaged_stamp_or_a_lost_environment_means_a_new_one(checkout):
+    environment = Recorded(checkout)
+    environment.prepare()
+    environment.did()
+    (environment.folder / STAMP).write_text('{"environment": ')
+    environment.prepare()
+    assert environment.did()[0] == '-m venv'
+    Path(environment.python).unlink()
+    environment.prepare()
+    assert environment.did()[0] == '-m venv'
+
+
+def test_where_ros_is_sourced_no_ros_wheel_is_installed(checkout):
+    sourced = {'ROS_DISTRO': 'jazzy', 'AMENT_PREFIX_PATH': '/opt/ros/jazzy'}
+    environment = Recorded(checkout, sourced)
+    environment.prepare()
+    assert environment.did() == ['-m venv', 'base.lock', '-e ']
+    # And the other way round: the same checkout in a shell without ROS.
+    environment = Recorded(checkout, {})
+    environment.prepare()
+    assert environment.did() == ['-m venv', 'ros.lock', 'base.lock', '-e ']
+
+
+def test_missing_system_packages_are_installed_by_root(checkout, monkeypatch):
+    monkeypatch.setattr(machine, 'missing_system_packages', lambda python: ['libegl1'])
+    monkeypatch.setattr(machine, 'is_root', lambda: True)
+    monkeypatch.setattr(machine, 'has_apt', lambda: True)
+    environment = Recorded(checkout)
+    environment.prepare()
+    assert environment.commands[0] == 'apt-get update'
+    assert environment.commands[1].endswith('libegl1')
+
+
+def test_missing_system_packages_are_named_to_others(checkout, monkeypatch):
+    monkeypatch.setattr(machine, 'missing_system_packages', lambda python: ['libegl1'])
+    monkeypatch.setattr(machine, 'is_root', lambda: False)
+    environment = Recorded(checkout)
+    with pytest.raises(BootstrapError, match='libegl1'):
+        environment.prepare()
+    assert environment.commands == []
+
+
+@pytest.mark.parametrize(
+    ('output', 'expected'),
+    [
+        ('ERROR: No matching distribution found for nonsense==1', 'No matching distribution'),
+        ('connection: NewConnectionError(...)\nERROR: No matching', 'needs the network'),
+    ],
+)
+def test_a_failing_command_is_explained_and_logged(tmp_path, output, expected):
+    environment = Environment(tmp_path, {}, say=lambda _: None)
+    with pytest.raises(BootstrapError, match=expected):
+        environment._run([sys.executable, '-c', f'print({output!r}); raise SystemExit(1)'])
+    assert output in environment.log.read_text()
+
+
+def test_two_setups_at_once_wait_for_each_other(checkout):
+    """The second finds everything done by the first when it gets its turn."""
+    first, second = Recorded(checkout), Recorded(checkout)
+    with first._only_one(), pytest.raises(BlockingIOError):
+        setup_environment.fcntl.flock(
+            (checkout / '.ja.lock').open('w'),
+            setup_environment.fcntl.LOCK_EX | setup_environment.fcntl.LOCK_NB,
+        )
+    first.prepare()
+    second.prepare()
+    assert second.did() == []
+
+
+def test_a_python_is_asked_what_it_is():
+    python = probe_python(sys.executable, {})
+    assert python is not None
+    assert python.version == sys.version_info[:2]
+    assert probe_python('no-such-python', {}) is None
+
+
+def test_another_environments_libraries_are_left_behind():
+    inherited = {
+        '_ROS_WHEELS_BOOTSTRAP_COMPLETE': '1',
+        'LD_LIBRARY_PATH': '/a/lib/python3.11/site-packages/ros_rcl.libs:/usr/local/cuda/lib',
+    }
+    assert clean_environ(inherited) == {'LD_LIBRARY_PATH': '/usr/local/cuda/lib'}
+    assert clean_environ({'LD_LIBRARY_PATH': '/x'}) == {'LD_LIBRARY_PATH': '/x'}
+
+
+def test_another_ros_distribution_is_refused_in_one_sentence():
+    answer = subprocess.run(
+        [sys.executable, str(ROOT / 'ja'), 'demo'],
+        env={'ROS_DISTRO': 'humble', 'PATH': '/usr/bin:/bin'},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert answer.returncode == 1
+    assert answer.stderr.startswith('ja: ROS 2 humble is sourced')
+    assert answer.stderr.count('\n') == 1
+
+
+def test_the_stamp_of_this_environment_is_complete():
+    """The suite runs in an environment that `ja` made."""
+    stamp = json.loads((ROOT / '.venv' / STAMP).read_text())
+    assert {'environment', 'base.lock', 'packages', 'dev.lock', 'python'} <= set(stamp)
