@@ -1,0 +1,77 @@
+"""A talker and a listener of images, `say` or `hear`, each a process; figures on stdout."""
+
+import json
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import Image
+
+from ja_common.image_codec import encode_image
+from ja_common.time_codec import to_ns, to_time
+from ja_common.topics import IMAGE
+
+IMAGES = 240
+RATE_HZ = 60.0
+SHAPE = (480, 640, 3)
+_PATIENCE_S = 30.0
+
+
+def say() -> dict[str, float]:
+    """Wait for the listener, then send it images; the seconds until it was found."""
+    node, executor = _node('say')
+    publisher = node.create_publisher(IMAGE.type, IMAGE.name, IMAGE.says)
+    began_s = time.monotonic()
+    _spin_until(executor, lambda: publisher.get_subscription_count() > 0)
+    discovery_s = time.monotonic() - began_s
+    picture = np.random.default_rng(0).integers(0, 256, SHAPE, np.uint8)
+    for number in range(IMAGES):
+        due_s = began_s + discovery_s + 0.5 + number / RATE_HZ
+        time.sleep(max(0.0, due_s - time.monotonic()))
+        # The monotonic clock is one for all processes of a machine.
+        publisher.publish(encode_image(picture, to_time(time.monotonic_ns()), ''))
+    return {'discovery_s': discovery_s}
+
+
+def hear() -> dict[str, list[float]]:
+    """Delays [ms] of the images that arrived, until none has come for a second."""
+    node, executor = _node('hear')
+    delays_ms: list[float] = []
+
+    def on_image(message: Image) -> None:
+        delays_ms.append(1e-6 * (time.monotonic_ns() - to_ns(message.header.stamp)))
+
+    node.create_subscription(IMAGE.type, IMAGE.name, on_image, IMAGE.hears)
+    print('listening', file=sys.stderr, flush=True)
+    _spin_until(executor, lambda: delays_ms)
+    heard, since_s = 0, time.monotonic()
+    while time.monotonic() - since_s < 1.0:
+        executor.spin_once(timeout_sec=0.1)
+        if len(delays_ms) > heard:
+            heard, since_s = len(delays_ms), time.monotonic()
+    return {'delays_ms': delays_ms}
+
+
+def _node(name: str) -> tuple[Node, SingleThreadedExecutor]:
+    rclpy.init()
+    node = Node(name)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    return node, executor
+
+
+def _spin_until(executor: SingleThreadedExecutor, condition: Callable[[], object]) -> None:
+    end_s = time.monotonic() + _PATIENCE_S
+    while not condition():
+        if time.monotonic() > end_s:
+            sys.exit(f'the other process was not heard of within {_PATIENCE_S:g} s')
+        executor.spin_once(timeout_sec=0.001)
+
+
+if __name__ == '__main__':
+    print(json.dumps({'say': say, 'hear': hear}[sys.argv[1]]()))
+    rclpy.shutdown()
