@@ -23,7 +23,7 @@ from ja_common.time_codec import to_ns
 from ja_common.topics import DETECTIONS, FACE_IMAGE, FIXATION, LM_DELTA
 from ja_learning.core.checkpoint import load_checkpoint, save_checkpoint
 from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
-from ja_learning.core.trial import TrialRecorder
+from ja_learning.core.trial import TrialRecorder, checked_face
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class LearningModuleNode(GraphNode):
         return ThreeLayerNetwork(self._network_config, self._config.seed)
 
     def _on_face_image(self, message: Image) -> None:
-        face = decode_image(message)[..., 0]
+        face = checked_face(decode_image(message)[..., 0])
         self._when_attended(FACE_IMAGE.name, message.header, face)
 
     def _on_detections(self, message: PointCloud2) -> None:

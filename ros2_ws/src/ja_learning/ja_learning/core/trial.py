@@ -12,6 +12,20 @@ from numpy.typing import ArrayLike, NDArray
 FACE_SHAPE = (30, 25)
 """Rows and columns of the picture of the caregiver's face (Nagai et al. 2003, section 3.1)."""
 
+SAME_POSTURE_RAD = 0.02
+"""Postures nearer than this in both joints are one and the same."""
+
+
+def checked_face(face: ArrayLike) -> NDArray[np.uint8]:
+    """The picture, uint8 (30, 25), of a face. Raises ValueError when it is something else."""
+    face = np.asarray(face)
+    if face.shape != FACE_SHAPE or face.dtype != np.uint8:
+        raise ValueError(
+            f'a face is uint8 of {FACE_SHAPE[0]} rows x {FACE_SHAPE[1]} columns, '
+            f'got {face.dtype} of shape {face.shape}'
+        )
+    return face
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -33,7 +47,7 @@ class Trial:
 class TrialRecorder:
     """Cuts the stream of looks, postures at rest and fixations into trials."""
 
-    def __init__(self, same_within_rad: float = 0.02) -> None:
+    def __init__(self, same_within_rad: float = SAME_POSTURE_RAD) -> None:
         self._same_within = same_within_rad
         self._face: NDArray[np.uint8] | None = None
         self._postures: list[NDArray[np.float64]] = []
@@ -45,13 +59,7 @@ class TrialRecorder:
 
     def look(self, face: ArrayLike, posture: ArrayLike) -> None:
         """The head attends to the caregiver: a trial begins, or its look goes on."""
-        face = np.asarray(face)
-        if face.shape != FACE_SHAPE or face.dtype != np.uint8:
-            raise ValueError(
-                f'a face is uint8 of {FACE_SHAPE[0]} rows x {FACE_SHAPE[1]} columns, '
-                f'got {face.dtype} of shape {face.shape}'
-            )
-        self._face = face
+        self._face = checked_face(face)
         self._postures = [np.array(posture, float)]
 
     def rest(self, posture: ArrayLike) -> None:
