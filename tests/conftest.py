@@ -3,13 +3,15 @@
 import os
 import random
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 
 import pytest
 import rclpy
 from rclpy.context import Context
 
 from ja_common.ros_defaults import apply_ros_defaults
+from node_bench import NodeBench
 
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 apply_ros_defaults()
@@ -45,3 +47,12 @@ def ros_context(domain: int) -> Iterator[Context]:
     rclpy.init(args=[], context=context, domain_id=domain)
     yield context
     context.try_shutdown()
+
+
+@pytest.fixture
+def make_bench(ros_context: Context) -> Iterator[Callable[..., NodeBench]]:
+    """Makes a NodeBench in the test's own domain; its nodes are destroyed at the end."""
+    with ExitStack() as benches:
+        yield lambda *args, **kwargs: benches.enter_context(
+            closing(NodeBench(ros_context, *args, **kwargs))
+        )

@@ -2,7 +2,7 @@
 
 import time
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
@@ -26,8 +26,8 @@ class NodeBench:
         self,
         context: Context,
         make_node: Callable[..., Node],
-        says: list[Topic] = (),
-        hears: list[Topic] = (),
+        says: Sequence[Topic] = (),
+        hears: Sequence[Topic] = (),
         **parameters: Any,
     ) -> None:
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
@@ -38,7 +38,8 @@ class NodeBench:
         self.executor.add_node(self.peer)
         self._heard: dict[str, list] = defaultdict(list)
         self._publishers = {
-            topic: self.peer.create_publisher(topic.type, topic.name, topic.says) for topic in says
+            topic.name: self.peer.create_publisher(topic.type, topic.name, topic.says)
+            for topic in says
         }
         for topic in hears:
             keep = self._heard[topic.name].append
@@ -48,13 +49,19 @@ class NodeBench:
         matched = [*self._publishers.values(), *answering]
         self.wait(lambda: all(p.get_subscription_count() for p in matched))
 
+    def close(self) -> None:
+        """Destroy both nodes."""
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.peer.destroy_node()
+
     def wait(self, condition: Callable[[], object]) -> None:
         """Spin until the condition holds."""
         spin_until(self.executor, condition)
 
     def say(self, topic: Topic, message: Any) -> None:
         """The peer publishes."""
-        self._publishers[topic].publish(message)
+        self._publishers[topic.name].publish(message)
 
     def say_posture(self, stamp_ns: int, pan: float = 0.0, tilt: float = 0.0, **more: Any) -> None:
         """The rig publishes a joint state; the head stands still unless `velocity` is given."""
@@ -73,6 +80,11 @@ class NodeBench:
         wanted = len(self.heard(topic)) + count
         self.wait(lambda: len(self.heard(topic)) >= wanted)
         return self.heard(topic)[wanted - 1]
+
+    def received(self, topic: Topic) -> int:
+        """How many messages the node under test has taken from a topic."""
+        (name,) = [name for name, heard in self.node.heard_topics.items() if heard is topic]
+        return int(self.node.health.report(time.monotonic()).values[f'{name} received'])
 
     def call(self, service_type: Any, name: str, **fields: Any) -> Any:
         """Call a service of the node; its response."""

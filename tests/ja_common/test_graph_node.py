@@ -1,0 +1,179 @@
+"""The base of every node: bad input is one clear error, silence is explained, the end is clean."""
+
+import os
+import signal
+from dataclasses import dataclass
+
+import pytest
+import rclpy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_srvs.srv import Trigger
+
+from ja_common.core.config import parameter
+from ja_common.core.health import Level
+from ja_common.graph_node import GraphNode, spin_node
+from ja_common.topics import DIAGNOSTICS, FIXATION, IMAGE, JOINT_STATES
+from node_bench import joint_state
+
+
+class Listener(GraphNode):
+    """Hears fixations; what its callbacks do is the test's."""
+
+    on_fixation = staticmethod(lambda message: None)
+    on_call = staticmethod(lambda request, response: response)
+
+    def __init__(self, **node_kwargs):
+        super().__init__('listener', **node_kwargs)
+        self.got = []
+        self.hear(FIXATION, self._on_fixation, expected_every_s=0.05)
+        self.offer(Trigger, 'do', lambda request, response: self.on_call(request, response))
+
+    def _on_fixation(self, message):
+        self.on_fixation(message)
+        self.got.append(message)
+
+
+@pytest.fixture
+def bench(make_bench):
+    return make_bench(Listener, says=[FIXATION], hears=[DIAGNOSTICS])
+
+
+def fail(error):
+    def raising(*_):
+        raise type(error)(*error.args)
+
+    return raising
+
+
+@pytest.mark.parametrize(
+    ('error', 'text'),
+    [
+        (ValueError('the ray is bent'), '/fixation: the ray is bent'),
+        (OSError('disk full'), '/fixation: disk full'),
+        (KeyError('oops'), "/fixation: KeyError: 'oops'"),
+    ],
+)
+def test_node_outlives_bad_input_and_says_it_once(bench, capfd, error, text):
+    bench.node.on_fixation = fail(error)
+    for stamp_ns in (1, 2, 3):
+        bench.say(FIXATION, joint_state(stamp_ns))
+    bench.wait(lambda: bench.received(FIXATION) == 3)
+    assert text in bench.complaint()
+    log = capfd.readouterr().err
+    assert log.count(text) == 1
+    assert ('Traceback' in log) == isinstance(error, KeyError), 'only for a fault of our own'
+    bench.node.on_fixation = lambda message: None
+    bench.say(FIXATION, joint_state(4))
+    bench.wait(lambda: bench.node.got)
+
+
+def test_diagnostics_tell_name_level_and_figures_at_one_hertz(bench):
+    bench.node.on_fixation = fail(ValueError('the ray is bent'))
+    bench.say(FIXATION, joint_state(1))
+    bench.wait(lambda: bench.complaint() != 'OK')
+    (status,) = bench.next(DIAGNOSTICS).status
+    assert status.name == '/listener'
+    assert status.level == bytes([Level.ERROR])
+    assert 'the ray is bent' in status.message
+    assert {value.key: value.value for value in status.values}['/fixation received'] == '1'
+
+
+def test_silence_is_explained_by_the_quality_of_service(make_bench):
+    bench = make_bench(Listener, hears=[DIAGNOSTICS])
+    bench.wait_for_complaint('no message on /fixation for more than 0.05 s: nobody publishes it')
+    lossy = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    bench.peer.create_publisher(FIXATION.type, FIXATION.name, lossy)
+    bench.wait_for_complaint(
+        'peer publishes it with a quality of service that does not match: BEST_EFFORT VOLATILE '
+        'is offered, RELIABLE VOLATILE is needed'
+    )
+
+
+def test_silence_of_a_publisher_that_says_nothing_and_its_end(bench):
+    bench.wait_for_complaint('peer is its publisher, but says nothing')
+    reports = len(bench.heard(DIAGNOSTICS))
+
+    def speaking_helps():
+        bench.say(FIXATION, joint_state(1))
+        said = [d.status[0].message for d in bench.heard(DIAGNOSTICS)[reports:]]
+        return any('says nothing' not in message for message in said)
+
+    bench.wait(speaking_helps)
+
+
+@pytest.mark.parametrize(
+    ('error', 'text'),
+    [
+        (ValueError('not now'), 'not now'),
+        (FileNotFoundError('no such file'), 'no such file'),
+        (KeyError('oops'), "KeyError: 'oops'"),
+    ],
+)
+def test_service_answers_what_went_wrong(bench, error, text):
+    bench.node.on_call = fail(error)
+    response = bench.call(Trigger, 'do')
+    assert not response.success
+    assert response.message == text
+
+
+def test_sensor_of_any_reliability_is_heard(make_bench):
+    """A camera driver speaks best-effort, a rig reliably."""
+
+    class Sensing(GraphNode):
+        def __init__(self, **node_kwargs):
+            super().__init__('sensing', **node_kwargs)
+            self.got = set()
+            self.hear(IMAGE, lambda message: self.got.add('image'))
+            self.hear(JOINT_STATES, lambda message: self.got.add('joints'))
+
+    bench = make_bench(Sensing, says=[IMAGE])
+    lossy = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    joints = bench.peer.create_publisher(JOINT_STATES.type, JOINT_STATES.name, lossy)
+
+    def heard_both():
+        bench.say(IMAGE, IMAGE.type())
+        joints.publish(joint_state(1))
+        return bench.node.got == {'image', 'joints'}
+
+    bench.wait(heard_both)
+
+
+@dataclass(frozen=True)
+class Config:
+    gain: float = parameter(1.0, 'gain', low=0.0)
+
+
+class Configured(GraphNode):
+    """Sends itself a signal once it spins."""
+
+    def __init__(self):
+        super().__init__('configured')
+        self.configure(Config)
+        self.create_timer(0.01, lambda: os.kill(os.getpid(), signal.SIGINT))
+
+
+def test_main_ends_quietly_on_a_signal(domain, capfd):
+    spin_node(Configured, ['--ros-args', '-p', 'gain:=2'])
+    assert not rclpy.ok()
+    assert capfd.readouterr().err == ''
+
+
+@pytest.mark.parametrize(
+    ('args', 'text'),
+    [
+        (['-p', 'gain:=-1.0'], 'gain out of range'),
+        (['-p', 'gain:=-1'], 'gain = -1.0 is outside the range from 0.0'),
+        (['-p', 'gain:=loud'], "gain = 'loud' is a str; a float is needed"),
+        (['--params-file', '/no/such/file.yaml'], '/no/such/file.yaml'),
+        (['--nonsense'], '--nonsense'),
+    ],
+)
+def test_main_refuses_bad_arguments_in_one_line(domain, capfd, args, text):
+    with pytest.raises(SystemExit) as ended:
+        spin_node(Configured, ['--ros-args', *args])
+    assert ended.value.code == 2
+    lines = capfd.readouterr().err.splitlines()
+    (error,) = [line for line in lines if '[rcl' not in line]  # rcl logs on its own account
+    assert error.startswith('error: ')
+    assert text in error
+    assert not rclpy.ok()
