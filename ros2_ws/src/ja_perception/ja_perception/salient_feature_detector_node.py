@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import Field, dataclass, fields, replace
 from typing import Any
 
@@ -38,13 +38,26 @@ from ja_perception.core.annotate import annotated
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.detector import DetectorConfig, Percept, SalientFeatureDetector
+from ja_perception.core.faces import FaceFinder
+from ja_perception.core.haar import HaarFaces
+from ja_perception.core.template_faces import TemplateFaces
 from ja_perception.core.waiting_images import WaitingImages
+
+FACE_FINDERS: dict[str, Callable[[], FaceFinder]] = {
+    'blazeface': BlazeFace,
+    'haar': HaarFaces,
+    'template': lambda: TemplateFaces(BlazeFace()),
+}
 
 
 @dataclass(frozen=True)
 class InputConfig:
     """What the node hears, and how long it waits for it."""
 
+    face_finder: str = parameter(
+        'blazeface', 'how faces are found: a network, a cascade, or the template of the paper',
+        choices=tuple(FACE_FINDERS),
+    )  # fmt: skip
     compressed: bool = parameter(False, 'hear image_raw/compressed instead of image_raw')
     field_of_view_rad: float = parameter(
         math.radians(36), 'horizontal view of a camera that sends no calibration',
@@ -65,7 +78,7 @@ class SalientFeatureDetectorNode(GraphNode):
         cv2.setNumThreads(1)
         self._input = self.configure(InputConfig)
         self._joints = JointCodec(self.configure(JointConfig))
-        self._finder = BlazeFace()
+        self._finder = FACE_FINDERS[self._input.face_finder]()
         self._config = DetectorConfig(
             **{part.name: self._tunable(part) for part in fields(DetectorConfig)}
         )

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ja_perception.core.box import Box
-from ja_perception.core.faces import Face
+from ja_perception.core.faces import Face, cut_square
 
 _INPUT = 128
 # The grids of the network's two heads: cells a side, anchors a cell.
 _GRIDS = ((16, 2), (8, 6))
+# Boxes that share more (intersection over union) are of one face.
 _SAME_FACE_IOU = 0.3
 
 
@@ -31,7 +32,7 @@ class BlazeFace:
     ``least_score`` is the confidence (0-1) below which a face is not reported.
     """
 
-    smallest_share = 0.13
+    smallest_share = 0.2
 
     def __init__(self, least_score: float = 0.4) -> None:
         model = files('ja_perception.models') / 'blazeface_short_range.tflite'
@@ -65,25 +66,6 @@ class BlazeFace:
             (u, v), (width, height) = points[:2].tolist()
             faces.append(Face(Box(u, v, width, height), score, points[2:]))
         return faces
-
-
-def cut_square(image: NDArray[np.uint8], square: Box, side: int) -> NDArray[np.uint8]:
-    """The part of ``image`` in ``square``, scaled to ``(side, side, 3)``; black outside."""
-    height, width = image.shape[:2]
-    left, top = round(square.left), round(square.top)
-    size = round(square.width)
-    x0, y0 = max(left, 0), max(top, 0)
-    x1, y1 = min(left + size, width), min(top + size, height)
-    look = np.zeros((side, side, 3), np.uint8)
-    if x1 <= x0 or y1 <= y0:
-        return look
-    scale = side / size
-    a, b = round((x0 - left) * scale), round((y0 - top) * scale)
-    c, d = round((x1 - left) * scale), round((y1 - top) * scale)
-    if c > a and d > b:
-        shrink = cv2.INTER_AREA if scale < 0.75 else cv2.INTER_LINEAR
-        cv2.resize(image[y0:y1, x0:x1], (c - a, d - b), dst=look[b:d, a:c], interpolation=shrink)
-    return look
 
 
 def _blended(

@@ -74,12 +74,18 @@ class SalientFeatureDetector:
     """Finds faces and salient objects in image after image."""
 
     def __init__(self, finder: FaceFinder, config: DetectorConfig | None = None) -> None:
-        config = config or DetectorConfig()
-        self._attention = config.attention
+        self._finder = finder
+        self._config = config or DetectorConfig()
+        self._posture_known = False
+        self.forget()
+
+    def forget(self) -> None:
+        """Start anew, as if nothing had been seen."""
+        config = self._config
+        self._faces = FaceWatch(self._finder, config.faces)
         self._objects = SalientObjects(
             config.interest, config.features, config.grouping, config.tracking
         )
-        self._faces = FaceWatch(finder, config.faces)
 
     def look(
         self,
@@ -94,6 +100,10 @@ class SalientFeatureDetector:
         stand still in the base frame, and no face counts as attended: whether the head is still is
         then not known.
         """
+        if self._posture_known != (posture is not None):
+            # Directions remembered without a posture mean nothing with one.
+            self._posture_known = posture is not None
+            self.forget()
         position = np.zeros(2) if posture is None else posture.position
         grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
         faces = self._faces.look(image, grey, camera, position, stamp_ns)
@@ -113,12 +123,12 @@ class SalientFeatureDetector:
 
     def _attends(self, ray: NDArray[np.float64], posture: Posture | None) -> bool:
         """Does the head rest with the ray (x, y) in the centre (Eq. 3)?"""
-        if posture is None or not posture.is_still(self._attention.still_below_rad_s):
+        if posture is None or not posture.is_still(self._config.attention.still_below_rad_s):
             return False
-        return stands_in_centre(ray, self._attention.d_th_rad)
+        return stands_in_centre(ray, self._config.attention.d_th_rad)
 
     def _crop_box(self, face: Box) -> Box:
-        width = self._attention.crop_widths * face.width
+        width = self._config.attention.crop_widths * face.width
         return Box(face.u, face.v, width, width * FACE_ROWS / FACE_COLUMNS)
 
 

@@ -40,7 +40,7 @@ def expected_image(
     if _in_front(corners, homography):
         # Fixed-point corners (4 bits), shrunk by the pixel that interpolation cannot fill.
         cv2.fillConvexPoly(seen, np.round(outline * 16).astype(np.int32), 1, shift=4)
-        seen = cv2.erode(seen, np.ones((3, 3), np.uint8), borderValue=0)
+        seen = cv2.erode(seen, np.ones((3, 3), np.uint8))
     return warped, seen
 
 

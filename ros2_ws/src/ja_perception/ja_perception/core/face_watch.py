@@ -23,6 +23,8 @@ from ja_perception.core.faces import Face, FaceFinder, without_doubles
 _LOOK_WIDTHS = 2.5
 # A look that would take more than this share of the picture takes the whole.
 _NEARLY_WHOLE = 0.6
+# Smaller faces hold too few pixels to be known for faces.
+_LEAST_FACE_PX = 20
 # A square of the scan is this many times smaller than the next larger one.
 _SCAN_STEP = 0.6
 _SCAN_OVERLAP = 0.3
@@ -44,8 +46,8 @@ class FaceConfig:
     new_face_score: float = parameter(
         0.7, 'confidence that a face needs in two looks to be taken for one', low=0.0, high=1.0
     )
-    smallest_scan_px: int = parameter(
-        200, 'side of the smallest square searched for faces', low=32, high=4096
+    smallest_face_share: float = parameter(
+        0.0625, 'smallest face searched for (share of the width of the image)', low=0.01, high=1.0
     )
     scan_every: int = parameter(
         5, 'images from one scanning look to the next while the caregiver is known',
@@ -200,7 +202,7 @@ class FaceWatch:
             else:
                 squares.append(look_at(box, whole))
         if self._scan_is_due():
-            places = scan_squares(view.image, self._config.smallest_scan_px)
+            places = scan_squares(view.image, self._smallest_square(view.image))
             self._scan_place = (self._scan_place + 1) % len(places)
             if places[self._scan_place] not in squares:
                 squares.append(places[self._scan_place])
@@ -213,6 +215,10 @@ class FaceWatch:
                 else:
                     found += self._second_look(view.image, face, square, whole)
         return without_doubles(found)
+
+    def _smallest_square(self, image: NDArray[np.uint8]) -> float:
+        smallest_px = max(self._config.smallest_face_share * image.shape[1], _LEAST_FACE_PX)
+        return smallest_px / self._finder.smallest_share
 
     def _scan_is_due(self) -> bool:
         if self._caregiver is None or self._until_scan <= 0:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,6 +32,25 @@ class FaceFinder(Protocol):
     def find(self, image: NDArray[np.uint8], square: Box) -> list[Face]:
         """Faces in ``square`` of an (H, W, 3) RGB image; the square may reach beyond it."""
         ...
+
+
+def cut_square(image: NDArray[np.uint8], square: Box, side: int) -> NDArray[np.uint8]:
+    """The part of ``image`` in ``square``, scaled to ``(side, side, 3)``; black outside."""
+    height, width = image.shape[:2]
+    left, top = round(square.left), round(square.top)
+    size = round(square.width)
+    x0, y0 = max(left, 0), max(top, 0)
+    x1, y1 = min(left + size, width), min(top + size, height)
+    look = np.zeros((side, side, 3), np.uint8)
+    if x1 <= x0 or y1 <= y0:
+        return look
+    scale = side / size
+    a, b = round((x0 - left) * scale), round((y0 - top) * scale)
+    c, d = round((x1 - left) * scale), round((y1 - top) * scale)
+    if c > a and d > b:
+        shrink = cv2.INTER_AREA if scale < 0.75 else cv2.INTER_LINEAR
+        cv2.resize(image[y0:y1, x0:x1], (c - a, d - b), dst=look[b:d, a:c], interpolation=shrink)
+    return look
 
 
 def without_doubles(faces: list[Face], most_overlap: float = 0.4) -> list[Face]:

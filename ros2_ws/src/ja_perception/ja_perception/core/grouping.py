@@ -1,6 +1,7 @@
 """From feature maps to objects: regions, separated where they touch, background left out."""
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import cv2
 import numpy as np
@@ -153,16 +154,33 @@ def _by_hue(mask: Mask, hue: NDArray[np.uint8], patch: _Patch, smallest: int) ->
     if family is None:
         return whole
     family_of_pixel = np.where(mask > 0, family[hue] + 1, 0)
-    parts = []
+    families = []
     for number in range(1, int(family.max()) + 2):
         part = (family_of_pixel == number).view(np.uint8)
         part = cv2.morphologyEx(part, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
         found = [p.inside(patch) for p in _patches(part, smallest)[1]]
-        parts += [Region(p.box, p.area) for p in found]
-    interleaved = any(
-        a.box.overlap(b.box) > _SEPARATE_OVERLAP for i, a in enumerate(parts) for b in parts[:i]
-    )
-    return whole if interleaved or len(parts) < 2 else parts
+        families.append([Region(p.box, p.area) for p in found])
+    parts = [part for family_parts in families for part in family_parts]
+    return whole if len(parts) < 2 or _interleave(families) else parts
+
+
+def _interleave(families: list[list[Region]]) -> bool:
+    """Do differently coloured parts lie in each other, or alternate as stripes and dots do?"""
+    for mine, theirs in combinations(families, 2):
+        if any(a.box.overlap(b.box) > _SEPARATE_OVERLAP for a in mine for b in theirs):
+            return True
+        alternate = min(len(mine), len(theirs)) > 1
+        if alternate and _hull(mine).overlap(_hull(theirs)) > _SEPARATE_OVERLAP:
+            return True
+    return False
+
+
+def _hull(regions: list[Region]) -> Box:
+    left = min(region.box.left for region in regions)
+    top = min(region.box.top for region in regions)
+    right = max(region.box.left + region.box.width for region in regions)
+    bottom = max(region.box.top + region.box.height for region in regions)
+    return Box((left + right) / 2, (top + bottom) / 2, right - left, bottom - top)
 
 
 def _hue_families(histogram: NDArray[np.float32]) -> NDArray[np.intp] | None:

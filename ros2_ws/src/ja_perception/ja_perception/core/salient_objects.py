@@ -23,6 +23,7 @@ from ja_perception.core.features import (
 )
 from ja_perception.core.grouping import Grouping, GroupingConfig, merged, texture_window
 from ja_perception.core.object_tracking import ObjectTracker, TrackingConfig
+from ja_perception.core.undistortion import bent, straightened
 
 # The area within d_th of the centre (Eq. 3) at unit focal length: the measure of f_col and f_mot.
 _GAZING_AREA = math.pi * math.tan(WIDTH_SIXTH) ** 2
@@ -147,6 +148,7 @@ class SalientObjects:
         height, width = grey.shape
         small = _scaled(grey, min(1.0, _MOTION_WIDTH_PX / width))
         camera = camera.resized(small.shape[1], small.shape[0])
+        small = straightened(small, camera)
         position = np.zeros(2) if posture is None else posture.position
         before, self._before = self._before, _Before(small, position, stamp_ns)
         slow = posture is None or posture.is_still(self._interest.motion_below_rad_s)
@@ -158,7 +160,7 @@ class SalientObjects:
             return np.zeros_like(grey)
         homography = rotation_homography(camera, position, before.position)
         expected, seen_before = expected_image(before.grey, homography)
-        moving = motion_map(small, expected, seen_before, self._features)
+        moving = bent(motion_map(small, expected, seen_before, self._features), camera)
         return cv2.resize(moving, (width, height), interpolation=cv2.INTER_NEAREST)
 
 

@@ -1,0 +1,58 @@
+"""Template matching, as the face detector of Nagai, Hosoda and Asada (2003) works."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ja_perception.core.box import Box
+from ja_perception.core.faces import Face, FaceFinder, cut_square, without_doubles
+
+_LOOK_PX = 128
+# Widths of the face tried, as shares of the look's side.
+_SCALES = 0.2 * 1.15 ** np.arange(9)
+_TEMPLATE_PX = 32
+
+
+class TemplateFaces:
+    """Finds again the first face that another finder (the ``teacher``) has shown it.
+
+    The template is that face, 32x32 in grey, matched at nine sizes by normalised correlation,
+    which is the score. It knows one person, facing as she did when she was shown.
+    """
+
+    smallest_share = float(_SCALES[0])
+
+    def __init__(self, teacher: FaceFinder, least_score: float = 0.6) -> None:
+        self._teacher = teacher
+        self._least_score = least_score
+        self._template: NDArray[np.uint8] | None = None
+
+    def find(self, image: NDArray[np.uint8], square: Box) -> list[Face]:
+        """See ``FaceFinder.find``."""
+        if self._template is None:
+            taught = self._teacher.find(image, square)
+            if taught:
+                self._template = _grey(image, _squared(taught[0].box), _TEMPLATE_PX)
+            return taught
+        look = _grey(image, square, _LOOK_PX)
+        return without_doubles([f for share in _SCALES for f in self._match(look, share, square)])
+
+    def _match(self, look: NDArray[np.uint8], share: float, square: Box) -> list[Face]:
+        side = round(share * _LOOK_PX)
+        template = cv2.resize(self._template, (side, side), interpolation=cv2.INTER_AREA)
+        match = cv2.matchTemplate(look, template, cv2.TM_CCOEFF_NORMED)
+        _, score, _, (x, y) = cv2.minMaxLoc(match)
+        if score < self._least_score:
+            return []
+        scale = square.width / _LOOK_PX
+        u, v = square.left + scale * (x + side / 2), square.top + scale * (y + side / 2)
+        return [Face(Box(u, v, scale * side, scale * side), float(score), np.empty((0, 2)))]
+
+
+def _grey(image: NDArray[np.uint8], square: Box, side: int) -> NDArray[np.uint8]:
+    return cv2.cvtColor(cut_square(image, square, side), cv2.COLOR_RGB2GRAY)
+
+
+def _squared(box: Box) -> Box:
+    side = max(box.width, box.height)
+    return Box(box.u, box.v, side, side)

@@ -1,0 +1,51 @@
+"""What the head's own motion does to the image, against the digital head's true perspective."""
+
+import cv2
+import numpy as np
+import pytest
+
+from ja_common.core.geometry import directions_of_rays, rays_of_directions
+from ja_perception.core.camera_model import CameraModel
+from ja_perception.core.ego_motion import expected_image, rotation_homography
+from ja_perception.core.undistortion import bent, straightened
+
+CAMERA = CameraModel.from_field_of_view(160, 120, np.radians(36))
+
+
+def test_homography_moves_pixels_as_the_geometry_does():
+    before, now = np.radians([3.0, -4.0]), np.radians([8.0, 2.0])
+    pixels = np.array([[20.0, 30.0], [80.0, 60.0], [150.0, 10.0]])
+    directions = directions_of_rays(before, CAMERA.rays(pixels))
+    expected = CAMERA.pixels(rays_of_directions(now, directions))
+    homography = rotation_homography(CAMERA, now, before)
+    moved = cv2.perspectiveTransform(pixels[None], homography)[0]
+    assert moved == pytest.approx(expected, abs=1e-6)
+
+
+def test_expected_image_shifts_and_knows_what_was_out_of_view():
+    image = np.zeros((120, 160), np.uint8)
+    image[55:65, 75:85] = 200
+    pan = np.arctan(30 / CAMERA.fx)
+    warped, seen = expected_image(image, rotation_homography(CAMERA, (pan, 0), (0, 0)))
+    # A turn to the left by 30 px moves the scene to the right, and shows 30 px never seen.
+    rows, columns = np.nonzero(warped > 100)
+    assert columns.mean() == pytest.approx(79.5 + 30, abs=0.5)
+    assert rows.mean() == pytest.approx(59.5, abs=0.5)
+    assert not seen[:, :27].any()
+    assert seen[5:115, 40:].all()
+
+
+def test_nothing_is_expected_after_a_turn_away():
+    image = np.full((120, 160), 77, np.uint8)
+    _, seen = expected_image(image, rotation_homography(CAMERA, (2.5, 0), (0, 0)))
+    assert not seen.any()
+
+
+def test_distortion_is_taken_out_and_put_back():
+    camera = CameraModel(160, 120, 150, 150, 79.5, 59.5, (-0.3, 0.05, 0.0, 0.0, 0.0))
+    mask = np.zeros((120, 160), np.uint8)
+    mask[20:40, 20:50] = 1
+    straight = straightened(mask, camera)
+    assert not np.array_equal(straight, mask)
+    assert (bent(straight, camera) != mask).mean() < 0.01
+    assert straightened(mask, CAMERA) is mask

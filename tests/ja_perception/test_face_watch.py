@@ -1,0 +1,166 @@
+"""Faces over time, with a finder that plays a script."""
+
+import numpy as np
+import pytest
+
+from ja_common.core.geometry import rays_of_directions
+from ja_perception.core.box import Box
+from ja_perception.core.camera_model import CameraModel
+from ja_perception.core.face_watch import FaceConfig, FaceWatch, look_at, scan_squares
+from ja_perception.core.faces import Face
+
+CAMERA = CameraModel.from_field_of_view(160, 120, np.radians(36))
+STEP_NS = 100_000_000
+
+
+class Person:
+    """A face at a direction [rad] with a width [px]."""
+
+    def __init__(self, pan=0.0, tilt=0.0, width=30.0, score=0.9):
+        self.direction, self.width, self.score = np.array([pan, tilt]), width, score
+
+
+class World:
+    """People seen from a turning head; also a FaceFinder that finds them in its squares."""
+
+    smallest_share = 0.2
+
+    def __init__(self, *people, **config):
+        self.people = list(people)
+        self.watch = FaceWatch(self, FaceConfig(**config))
+        self.posture = np.zeros(2)
+        self.now_ns = 0
+        self.squares = []
+        self.rng = np.random.default_rng(0)
+
+    def find(self, image, square):
+        self.squares.append(square)
+        faces = []
+        for person in self.people:
+            u, v = CAMERA.pixels(rays_of_directions(self.posture, person.direction))
+            inside = max(abs(u - square.u), abs(v - square.v)) < square.width / 2
+            if inside and CAMERA.contains((u, v)):
+                box = Box(float(u), float(v), person.width, person.width)
+                faces.append(Face(box, person.score, np.empty((0, 2))))
+        return faces
+
+    def look(self, pan=0.0, changed=True):
+        """The next image; noise makes every one a changed one."""
+        self.posture = np.array([pan, 0.0])
+        self.now_ns += STEP_NS
+        self.squares.clear()
+        shape = (120, 160)
+        grey = self.rng.integers(0, 256, shape, np.uint8) if changed else np.zeros(shape, np.uint8)
+        image = np.dstack([grey] * 3)
+        return self.watch.look(image, grey, CAMERA, self.posture, self.now_ns)
+
+
+def test_face_keeps_its_number_while_the_head_turns():
+    world = World(Person(pan=0.1))
+    (first,) = world.look(0.0)
+    (again,) = world.look(0.25)
+    assert again.track_id == first.track_id
+    u = CAMERA.pixels(rays_of_directions((0.25, 0), (0.1, 0)))[0]
+    assert again.box(CAMERA, np.array([0.25, 0])).u == pytest.approx(u, abs=0.01)
+
+
+def test_out_of_view_the_caregiver_is_remembered_and_not_reported():
+    world = World(Person())
+    (first,) = world.look(0.0)
+    for _ in range(100):
+        assert world.look(1.0) == []
+    (again,) = world.look(0.0)
+    assert again.track_id == first.track_id
+
+
+def test_caregiver_is_the_largest_at_first_and_then_stays_it():
+    near, far = Person(-0.15, width=30), Person(0.15, width=22)
+    world = World(far, near)
+    caregiver = world.look()[0]
+    assert caregiver.box(CAMERA, world.posture).width == pytest.approx(30)
+    far.width = 45
+    faces = world.look()
+    assert faces[0].track_id == caregiver.track_id
+    assert len(faces) == 2
+
+
+def test_missed_for_a_moment_she_is_held_then_not_reported_then_forgotten():
+    world = World(Person(), hold_face_s=0.25, forget_face_s=0.85)
+    (first,) = world.look()
+    (person,) = world.people
+    world.people.clear()
+    counts = [len(world.look()) for _ in range(8)]
+    assert counts == [1, 1, 0, 0, 0, 0, 0, 0]
+    world.people.append(person)
+    (again,) = world.look()
+    assert again.track_id == first.track_id
+    world.people.clear()
+    for _ in range(9):
+        world.look()
+    world.people.append(person)
+    (stranger,) = world.look()
+    assert stranger.track_id != first.track_id
+
+
+def test_jitter_is_averaged_and_a_turn_is_followed_at_once():
+    person = Person()
+    world = World(person, face_averaging=20)
+    rng = np.random.default_rng(1)
+    places = []
+    for _ in range(60):
+        person.direction = rng.normal(0, 0.001, 2)
+        (face,) = world.look()
+        places.append(face.box(CAMERA, world.posture).u)
+    jitter_px = 0.001 * CAMERA.fx
+    assert np.std(np.diff(places[20:])) < 0.2 * jitter_px
+    person.direction = np.array([0.03, 0.0])
+    (face,) = world.look()
+    expected = CAMERA.pixels(rays_of_directions((0, 0), person.direction))[0]
+    assert face.box(CAMERA, world.posture).u == pytest.approx(expected, abs=0.01)
+
+
+def test_new_face_needs_confidence_but_a_known_one_may_turn_away():
+    person = Person(score=0.6)
+    world = World(person)
+    assert world.look() == []
+    person.score = 0.8
+    assert len(world.look()) == 1
+    person.score = 0.5
+    assert len(world.look()) == 1
+
+
+def test_unchanged_face_costs_no_look():
+    world = World(Person(), scan_every=1000)
+    world.look(changed=False)
+    assert len(world.look(changed=False)) == 1
+    assert world.squares == []
+    world.look(changed=True)
+    assert len(world.squares) == 1
+
+
+def test_clock_set_back_forgets():
+    world = World(Person())
+    (first,) = world.look()
+    world.now_ns = -10 * STEP_NS
+    (again,) = world.look()
+    assert again.track_id != first.track_id
+
+
+def test_scan_goes_round_and_covers_every_place_with_small_squares():
+    image = np.zeros((480, 640, 3), np.uint8)
+    squares = scan_squares(image, 200)
+    assert squares[0] == Box(319.5, 239.5, 640, 640)
+    smallest = min(square.width for square in squares)
+    assert 200 <= smallest < 334
+    small = [s for s in squares if s.width == smallest]
+    face = 40
+    for u in range(face // 2, 640 - face // 2, 10):
+        for v in range(face // 2, 480 - face // 2, 10):
+            margin = smallest / 2 - face / 2
+            assert any(abs(s.u - u) <= margin and abs(s.v - v) <= margin for s in small), (u, v)
+
+
+def test_look_at_a_large_face_takes_the_whole_picture():
+    whole = Box(79.5, 59.5, 160, 160)
+    assert look_at(Box(80, 60, 60, 60), whole) is whole
+    assert look_at(Box(80, 60, 20, 20), whole) == Box(80, 60, 50, 50)
