@@ -1,0 +1,41 @@
+"""The picture for people."""
+
+import numpy as np
+import pytest
+
+from ja_common.core.posture import Posture
+from ja_perception.core.annotate import annotated
+from ja_perception.core.blazeface import BlazeFace
+from ja_perception.core.camera_model import CameraModel
+from ja_perception.core.detector import SalientFeatureDetector
+from synthetic_pictures import draw_ball, draw_face, room
+
+
+@pytest.mark.parametrize('size', [(64, 48), (320, 240), (640, 480)])
+def test_draws_on_a_copy_what_was_found(size):
+    width, height = size
+    picture = room(width, height)
+    draw_face(picture, width / 2, 0.45 * height, 0.3 * width)
+    draw_ball(picture, 0.85 * width, 0.2 * height, 0.05 * width)
+    camera = CameraModel.from_field_of_view(width, height, np.radians(36))
+    posture = Posture(1, np.zeros(2), np.zeros(2))
+    percept = SalientFeatureDetector(BlazeFace()).look(picture, 1, camera, posture)
+    before = picture.copy()
+    drawn = annotated(picture, percept, camera, d_th_rad=0.1, latency_s=0.0123)
+    assert np.array_equal(picture, before)
+    scale = drawn.shape[1] // width
+    assert drawn.shape == (scale * height, scale * width, 3)
+    assert drawn.shape[1] >= 480
+    # The circle of d_th around the centre, white wherever nothing else covers it.
+    angles = np.linspace(0, 2 * np.pi, 90)
+    radius = scale * camera.fx * np.tan(0.1)
+    u = (scale * (camera.cx + 0.5) - 0.5 + radius * np.cos(angles)).astype(int)
+    v = (scale * (camera.cy + 0.5) - 0.5 + radius * np.sin(angles)).astype(int)
+    white = [
+        drawn[y - 1 : y + 3, x - 1 : x + 3].min(axis=2).max() > 200
+        for x, y in zip(u, v, strict=True)
+    ]
+    assert np.mean(white) > 0.7
+    if percept.face_image is not None:
+        inset = drawn[: drawn.shape[0] // 5, -drawn.shape[1] // 8 :]
+        assert np.all(inset[..., 0] == inset[..., 1])
