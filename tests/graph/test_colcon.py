@@ -61,9 +61,9 @@ def test_a_node_of_the_built_workspace_runs(tmp_path, ros_context):
 
 
 def _data(package: Path) -> set[str]:
-    """Relative paths of all the files that are not Python's."""
+    """Relative paths of all the files that are not Python's, nor its caches'."""
     return {
         str(path.relative_to(package))
         for path in package.rglob('*')
-        if path.is_file() and path.suffix not in ('.py', '.pyc')
+        if path.is_file() and path.suffix != '.py' and '__pycache__' not in path.parts
     }

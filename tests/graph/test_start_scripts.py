@@ -35,13 +35,15 @@ def logs(folder: Path) -> str:
     return '\n'.join(path.read_text() for path in folder.glob('runs/*/log/*.log'))
 
 
-@pytest.mark.parametrize('composition', [[], ['--one-process']], ids=['many', 'one'])
-def test_the_demo_runs_to_its_end(composition, tmp_path):
-    process = start(tmp_path, 'demo', '--trials', '3', '--time', '60', *composition)
+@pytest.mark.parametrize(
+    'options', [['--exam', '2'], ['--exam', '0', '--one-process']], ids=['many', 'one']
+)
+def test_the_demo_runs_to_its_end(options, tmp_path):
+    process = start(tmp_path, 'demo', '--trials', '3', *options)
     output, _ = process.communicate(timeout=90)
     assert process.returncode == 0, output
     assert 'Traceback' not in output + logs(tmp_path)
-    assert 'success rate, last trials' in output
+    assert 'practice, last trials' in output
     [curve] = tmp_path.glob('runs/*-demo/success_curve.csv')
     rows = list(csv.DictReader(curve.open()))
     assert len(rows) >= 3
