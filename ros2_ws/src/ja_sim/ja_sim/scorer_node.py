@@ -1,7 +1,7 @@
 """`scorer`: joins the truth with what the robot fixated; no other node may hear the truth."""
 
 import csv
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,11 @@ from ja_common.time_codec import to_ns
 from ja_common.topics import FIXATION, SCORE, SIM_TRUTH, SUCCESS_RATE
 from ja_sim.core.score import Outcome, Score
 from ja_sim.truth_codec import decode_truth
+
+_CSV_COLUMNS = (
+    'trial', 'stamp_ns', 'objects', 'in_view', 'success', 'attended_pan_rad', 'attended_tilt_rad',
+    'fixated_pan_rad', 'fixated_tilt_rad',
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -56,8 +61,8 @@ class ScorerNode(GraphNode):
         Path(path).expanduser().parent.mkdir(parents=True, exist_ok=True)
         # Line-buffered: every finished trial is on disk at once. Closed by destroy_node.
         file = open(Path(path).expanduser(), 'w', newline='', buffering=1)  # noqa: SIM115
-        self._csv = csv.DictWriter(file, [field.name for field in fields(Outcome)])
-        self._csv.writeheader()
+        self._csv = csv.writer(file)
+        self._csv.writerow(_CSV_COLUMNS)
         return file
 
     def _on_truth(self, message: PointCloud2) -> None:
@@ -76,7 +81,7 @@ class ScorerNode(GraphNode):
 
     def _tell(self, outcome: Outcome) -> None:
         if self._csv_file is not None:
-            self._csv.writerow(asdict(outcome))
+            self._csv.writerow(_csv_row(outcome))
         rates = self._score.rates()
         values = {'objects': str(outcome.objects)}
         for name, rate in rates.items():
@@ -102,6 +107,13 @@ class ScorerNode(GraphNode):
         self._score = Score(self._config.window_trials)
         response.success, response.message = True, 'counting from nought'
         return response
+
+
+def _csv_row(outcome: Outcome) -> list[Any]:
+    numbers = [outcome.trial, outcome.stamp_ns, outcome.objects]
+    flags = [int(outcome.in_view), int(outcome.success)]
+    fixated = outcome.fixated or ('', '')  # given up
+    return [*numbers, *flags, *outcome.attended, *fixated]
 
 
 def main(args: list[str] | None = None) -> None:

@@ -31,7 +31,9 @@ def decode_truth(message: PointCloud2) -> TruthAt:
     """What the scorer needs of it. Raises ValueError when the message is something else."""
     columns = decode_columns(message, FIELDS)
     attended = np.flatnonzero(columns['attended'])
-    if len(attended) > 1 or not len(columns['trial']):
+    if not len(columns['trial']):
+        raise ValueError('the truth holds no object')
+    if len(attended) > 1:
         raise ValueError(f'{len(attended)} objects are marked as attended; it must be one')
     return TruthAt(
         to_ns(message.header.stamp),

@@ -67,6 +67,7 @@ class Score:
 
     def __init__(self, window: int = 100) -> None:
         self._truth: TruthAt | None = None
+        self._is_whole = False  # the trial under way was seen from its beginning
         self._fixated: tuple[float, float] | None = None
         self._success = False
         self._recent: deque[bool] = deque(maxlen=window)
@@ -75,16 +76,17 @@ class Score:
     def see(self, truth: TruthAt, fixation: NDArray[np.float64] | None) -> Outcome | None:
         """One image: the truth and the fixation (2,) [rad] at its stamp; what just ended, if any.
 
-        A trial ends when the next begins. What happens before the first look belongs to none, and
-        one that a reset of the world cuts off does not count.
+        A trial ends when the next begins. What happens before the first look (trial 0) belongs to
+        none. A trial that a reset of the world cuts off, or of which only a part was seen, does
+        not count.
         """
         ended = None
         if self._truth is not None and truth.trial != self._truth.trial:
-            if truth.trial > self._truth.trial:
+            if self._is_whole and truth.trial > self._truth.trial:
                 ended = self._close(self._truth)
-            self._fixated, self._success = None, False
+            self._is_whole, self._fixated, self._success = truth.trial > 0, None, False
         self._truth = truth
-        if fixation is not None and self._fixated is None and truth.trial > 0:
+        if fixation is not None and self._fixated is None:
             nearest = int(np.argmin(angle_between(truth.directions, fixation)))
             self._fixated = (float(fixation[0]), float(fixation[1]))
             self._success = nearest == truth.attended
@@ -94,9 +96,7 @@ class Score:
         """Rates by name: 'all', 'recent', 'in_view', 'out_of_view', and 'objects_N'."""
         return {'recent': Rate(sum(self._recent), len(self._recent)), **self._rates}
 
-    def _close(self, truth: TruthAt) -> Outcome | None:
-        if truth.trial <= 0:
-            return None
+    def _close(self, truth: TruthAt) -> Outcome:
         outcome = Outcome(
             truth.trial,
             truth.stamp_ns,
