@@ -23,7 +23,7 @@ def _qos(reliable: bool, depth: int, latched: bool = False) -> QoSProfile:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # each is one of a kind, and may be a key
 class Topic:
     """One topic: who says it speaks with `says`, who hears it listens with `hears`."""
 
