@@ -1,0 +1,1 @@
+"""Benchmarks of single parts, without the graph; `ja_bringup.bench` runs them."""

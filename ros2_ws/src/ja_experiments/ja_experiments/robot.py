@@ -1,0 +1,98 @@
+"""The robot without ROS: the cores of the graph's nodes, called in the order of its messages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ja_common.core.detection import Detection, caregiver_face, most_salient
+from ja_common.core.posture import Posture
+from ja_control.core.attention_cycle import AttentionCycle, Decision, Percept
+from ja_control.core.gating import Gating
+from ja_control.core.joint_limits import JointLimits
+from ja_control.core.visual_feedback import visual_feedback
+from ja_experiments.config import ExperimentConfig
+from ja_learning.core.evaluator import InternalEvaluator
+from ja_learning.core.trial import Trial, TrialRecorder
+
+
+class Learner(Protocol):
+    """What the robot asks of its learning module."""
+
+    def predict(self, face: ArrayLike, posture: ArrayLike) -> NDArray[np.float64]:
+        """Proposed change of posture, (2,) [rad]."""
+
+    def learn(self, trial: Trial) -> None:
+        """Learn from one trial."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """What the robot made of one image.
+
+    `command`: the posture (2,) [rad] that the head is sent to. `fixation`: direction (2,) [rad] of
+    the object in the centre, or None. `lm_delta`: what the network proposed, (2,) [rad], or None.
+    """
+
+    command: NDArray[np.float64]
+    decision: Decision
+    fixation: NDArray[np.float64] | None
+    lm_delta: NDArray[np.float64] | None
+
+
+class Robot:
+    """Controller, learner, evaluator and gate; the head, the eyes and the world are not part."""
+
+    def __init__(
+        self, config: ExperimentConfig, learner: Learner, rng: np.random.Generator
+    ) -> None:
+        self._learner = learner
+        self._config = config
+        self._cycle = AttentionCycle(config.cycle, Gating(config.gating), rng)
+        self._evaluator = InternalEvaluator(config.evaluator)
+        self._limits = JointLimits(config.limits)
+        self._trial = TrialRecorder()
+
+    def step(
+        self, detections: list[Detection], face: NDArray[np.uint8] | None, posture: Posture
+    ) -> Step:
+        """One image, as detections and the picture of the attended `face`, uint8 (30, 25)."""
+        lm_delta = self._propose(face, posture)
+        fixation = self._evaluator.fixation(detections, posture)
+        percept = Percept(
+            posture,
+            face_delta=self._feedback(caregiver_face(detections)),
+            vf_delta=self._feedback(most_salient(detections)),
+            lm_delta=lm_delta,
+            fixation=fixation,
+        )
+        if fixation is not None:
+            self._learn(fixation, posture)
+        decision = self._cycle.step(percept)
+        return Step(self._limits.clip(decision.target), decision, fixation, lm_delta)
+
+    def _feedback(self, seen: Detection | None) -> NDArray[np.float64] | None:
+        gain = self._config.visual_feedback.gain
+        return None if seen is None else visual_feedback(seen.ray, gain)
+
+    def _propose(
+        self, face: NDArray[np.uint8] | None, posture: Posture
+    ) -> NDArray[np.float64] | None:
+        if face is not None:
+            self._trial.look(face, posture.position)
+        elif posture.is_still(self._config.cycle.still_below_rad_s):
+            self._trial.rest(posture.position)
+        if self._trial.face is None:
+            return None
+        return self._learner.predict(self._trial.face, posture.position)
+
+    def _learn(self, fixation: NDArray[np.float64], posture: Posture) -> None:
+        trial = self._trial.fixate(posture.position, fixation)
+        if trial is None:
+            return
+        if self._config.task.taught == 'executed':
+            trial = replace(trial, fixation=posture.position)
+        self._learner.learn(trial)
