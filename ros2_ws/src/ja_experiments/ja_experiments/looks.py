@@ -108,9 +108,8 @@ def _read(kept: Path, maker: dict[str, Any]) -> Looks:
         raise _NotUsableError(f'those in {kept} cannot be read: {error}') from None
     if not isinstance(manifest, dict) or manifest.get('sha256') != _sha256([data]):
         raise _NotUsableError(f'those in {kept} are damaged')
-    changed = [
-        key for key, value in maker.items() if manifest.get('made_by', {}).get(key) != value
-    ]
+    made_by = manifest.get('made_by', {})
+    changed = [key for key, value in maker.items() if made_by.get(key) != value]
     if changed:
         raise _NotUsableError(f'those in {kept} were made by other {", ".join(changed)}')
     with np.load(kept / 'looks.npz', allow_pickle=False) as arrays:
@@ -185,7 +184,9 @@ def _render(scene: str, seed: int, count: int, progress: Callable[[int], None]) 
     )
     world = JointAttentionWorld(load_scene(scene), seed, _IMAGE_SIZE)
     task = RenderedTask(world, Robot(config, _LooksAside(), np.random.default_rng(seed)))
-    faces, postures, directions = [], [], []
+    faces: list[NDArray] = []
+    postures: list[NDArray] = []
+    directions: list[NDArray] = []
     trial = 0
     try:
         while len(faces) < count:

@@ -16,7 +16,7 @@ from ja_sim.core.world import JointAttentionWorld, Truth
 
 IMAGE_PERIOD_S = 0.1
 DWELL_S = 0.5
-"""How long to watch the face: she needs her reaction and her turn until it shows where she looks."""
+"""How long to watch the face: it shows where she looks after her reaction and her turn."""
 
 
 @dataclass(frozen=True)
