@@ -38,19 +38,46 @@ EXPRESSION = {
 }
 # Identity: macro targets that add up, then details (name: weight), then the style of the hair.
 IDENTITIES = {
-    'anna': ('caucasian-female-young', {'head/head-oval': 0.6, 'nose/nose-volume-decr': 0.4}, 'bob'),
-    'bilal': ('african-male-young', {'head/head-square': 0.5, 'chin/chin-width-incr': 0.4}, 'crop'),
-    'chiyo': ('asian-female-young', {'head/head-round': 0.5, 'mouth/mouth-scale-horiz-decr': 0.3},
-              'full'),
-    'dieter': ('caucasian-male-old', {'nose/nose-hump-incr': 0.5, 'head/head-rectangular': 0.5},
-               'crop'),
-    'efua': ('african-female-young', {'head/head-diamond': 0.4, 'eyes/r-eye-scale-incr': 0.3,
-                                      'eyes/l-eye-scale-incr': 0.3}, 'full'),
-    'goro': ('asian-male-young', {'head/head-fat-incr': 0.4, 'nose/nose-width2-incr': 0.3}, 'crop'),
-    'hanna': ('caucasian-female-old', {'head/head-triangular': 0.3, 'head/head-age-incr': 0.3},
-              'bob'),
-    'ivo': ('caucasian-male-young', {'chin/chin-prominent-incr': 0.4, 'head/head-oval': 0.3},
-            'full'),
+    'anna': (
+        'caucasian-female-young',
+        {'head/head-oval': 0.6, 'nose/nose-volume-decr': 0.4},
+        'bob',
+    ),
+    'bilal': (
+        'african-male-young',
+        {'head/head-square': 0.5, 'chin/chin-width-incr': 0.4},
+        'crop',
+    ),
+    'chiyo': (
+        'asian-female-young',
+        {'head/head-round': 0.5, 'mouth/mouth-scale-horiz-decr': 0.3},
+        'full',
+    ),
+    'dieter': (
+        'caucasian-male-old',
+        {'nose/nose-hump-incr': 0.5, 'head/head-rectangular': 0.5},
+        'crop',
+    ),
+    'efua': (
+        'african-female-young',
+        {'head/head-diamond': 0.4, 'eyes/r-eye-scale-incr': 0.3, 'eyes/l-eye-scale-incr': 0.3},
+        'full',
+    ),
+    'goro': (
+        'asian-male-young',
+        {'head/head-fat-incr': 0.4, 'nose/nose-width2-incr': 0.3},
+        'crop',
+    ),
+    'hanna': (
+        'caucasian-female-old',
+        {'head/head-triangular': 0.3, 'head/head-age-incr': 0.3},
+        'bob',
+    ),
+    'ivo': (
+        'caucasian-male-young',
+        {'chin/chin-prominent-incr': 0.4, 'head/head-oval': 0.3},
+        'full',
+    ),
 }
 
 
@@ -185,7 +212,9 @@ def hair_offset(base: BaseMesh, style: str) -> np.ndarray:
     """
     side = np.abs(np.degrees(azimuth(base.vertices)))
     hairline = np.interp(
-        side, [0, 35, 52, 66, 80, 92, 104, 120, 180], [7.98, 7.95, 7.8, 7.4, 7.2, 7.25, 6.9, 6.5, 6.3]
+        side,
+        [0, 35, 52, 66, 80, 92, 104, 120, 180],
+        [7.98, 7.95, 7.8, 7.4, 7.2, 7.25, 6.9, 6.5, 6.3],
     )
     behind = base.vertices[:, 1] - hairline
     waves = 1.0 + 0.15 * np.sin(9.0 * azimuth(base.vertices) + 2.0 * base.vertices[:, 1])
@@ -324,14 +353,16 @@ def make(wheel: Path) -> tuple[dict[str, np.ndarray], np.ndarray]:
         # The head nods and turns about the top of the neck.
         pivot = 0.5 * (base.centre('joint-neck', person) + base.centre('joint-head', person))
         eyes = np.array([base.centre(f'helper-{side}-eye', person) for side in 'lr'])
-        spans = [np.ptp(person[np.unique(base.faces[f'helper-{side}-eye'])][:, 1]) for side in 'lr']
+        spans = [
+            np.ptp(person[np.unique(base.faces[f'helper-{side}-eye'])][:, 1]) for side in 'lr'
+        ]
         skin = slim_neck(base, person)
         hair, hair_faces = hair_mesh(base, skin, quads, style)
         arrays |= {
             f'{name}.head': rest_frame(skin[used], pivot),
-            f'{name}.normals': normals(skin, triangles(quads))[used][:, [2, 0, 1]].astype(
-                np.float32
-            ).round(3),
+            f'{name}.normals': normals(skin, triangles(quads))[used][:, [2, 0, 1]]
+            .astype(np.float32)
+            .round(3),
             f'{name}.hair': rest_frame(hair, pivot),
             f'{name}.hair_faces': hair_faces.astype(np.uint16),
             f'{name}.shirt': rest_frame(arms_down(base, person)[shirt], pivot),

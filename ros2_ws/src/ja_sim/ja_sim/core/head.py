@@ -18,7 +18,7 @@ TIMESTEP_S = 0.001
 AXES = {'pan': (0, 0, 1), 'tilt': (0, 1, 0)}
 # Inertias add up to 1, so that forces are accelerations [rad/s^2].
 ROTOR_INERTIA, LOAD_INERTIA = 0.8, 0.2
-# Bearings: dry friction keeps the load where the gear left it while the rotor crosses the play.
+# Bearings' dry friction. A load that the gear brakes harder than this coasts across the play.
 LOAD_FRICTION_RAD_S2 = 2.0
 
 
@@ -60,6 +60,13 @@ class PanTiltHead:
         steps = round((time_s - self._data.time) / TIMESTEP_S)
         if steps > 0:
             mujoco.mj_step(self._model, self._data, steps)
+            # A step leaves the sensors at its beginning.
+            mujoco.mj_forward(self._model, self._data)
+
+    @property
+    def time_s(self) -> float:
+        """Time since the reset [s]."""
+        return float(self._data.time)
 
     @property
     def posture(self) -> np.ndarray:

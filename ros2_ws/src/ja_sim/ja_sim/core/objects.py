@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from ja_common.core.config import ConfigError
-from ja_common.core.geometry import angle_between, directions_of_vectors, vectors_of_directions
+from ja_common.core.geometry import vectors_of_directions
 
 from .specs import ObjectsSpec
 
@@ -19,7 +19,7 @@ PATTERNS = ('plain', 'checker', 'dots', 'cross')
 MOTION_RADIUS_M = 0.015
 MOTION_RATE_HZ = 0.8
 CEILING_HEIGHT_M = 1.5
-_TRIES = 1000
+_ARRANGEMENTS, _PLACES = 20, 400  # tried before the scene is called too full
 
 
 @dataclass(frozen=True)
@@ -73,21 +73,24 @@ class Arrangement:
 
     def _draw_positions(self) -> list[np.ndarray]:
         """Draw one after the other, each clear of the face and of those before it."""
-        gap_to_face = math.radians(self._spec.gap_to_face_deg)
-        gap = math.radians(self._spec.gap_deg)
-        face = directions_of_vectors(self._face)
-        for _ in range(_TRIES):
+        spec = self._spec
+        nearest_to_face = math.cos(math.radians(spec.gap_to_face_deg))
+        nearest = math.cos(math.radians(spec.gap_deg))
+        face = self._face / np.linalg.norm(self._face)
+        for _ in range(_ARRANGEMENTS):
             positions: list[np.ndarray] = []
-            for _ in range(_TRIES):
+            directions = np.zeros((0, 3))
+            for _ in range(_PLACES):
                 place = self.draw_place()
-                direction = directions_of_vectors(place)
-                taken = [angle_between(direction, directions_of_vectors(p)) for p in positions]
-                if angle_between(direction, face) > gap_to_face and min(taken, default=9.0) > gap:
+                direction = place / math.hypot(*place)
+                clear = direction @ face < nearest_to_face
+                if clear and (directions @ direction).max(initial=-1.0) < nearest:
                     positions.append(place)
-                if len(positions) == self._spec.count:
+                    directions = np.vstack([directions, direction])
+                if len(positions) == spec.count:
                     return positions
         raise ConfigError(
-            f'objects: no room for {self._spec.count} objects {self._spec.gap_deg:g} deg apart; '
+            f'objects: no room for {spec.count} objects {spec.gap_deg:g} deg apart; '
             'widen pan_deg and tilt_deg, or lower count or gap_deg'
         )
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 
 import mujoco
@@ -165,6 +165,21 @@ class JointAttentionWorld:
             image = expose(sharp, view.velocity, self.intrinsics, self.scene.head, self._image_rng)
             self._observation = Observation(image, view.stamp_ns, self.intrinsics)
         return self._observation
+
+    def picture(
+        self, head: np.ndarray | None = None, eyes_closed: bool | None = None
+    ) -> np.ndarray:
+        """A sharp picture (H, W, 3) of this moment, with her head turned otherwise for its sake.
+
+        ``head`` (2,) [rad] is yaw and pitch; her eyes then look straight ahead. For experiments;
+        the world does not notice.
+        """
+        view = self._view()
+        if head is not None:
+            view = replace(view, gaze=GazePose(np.asarray(head, float), np.zeros((2, 2))))
+        if eyes_closed is not None:
+            view = replace(view, eyes_closed=eyes_closed)
+        return self._draw(view)
 
     def joint_state(self) -> JointSample:
         """The newest reading of the encoders."""
