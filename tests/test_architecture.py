@@ -1,0 +1,137 @@
+"""What every package promises: documented parameters, nodes that start, libraries in their place.
+
+Who may import whom is held by `graph/test_rooms.py`.
+"""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from ja_common.topics import TOPICS
+
+SOURCES = Path(__file__).parent.parent / 'ros2_ws' / 'src'
+PACKAGES = sorted(path.name for path in SOURCES.iterdir() if path.is_dir())
+TREES = {
+    path.relative_to(SOURCES): ast.parse(path.read_text())
+    for package in PACKAGES
+    for path in sorted((SOURCES / package / package).rglob('*.py'))
+}
+NODES = [path for path in TREES if path.stem.endswith('_node') and path.stem != 'graph_node']
+
+# A rig's small computer installs what its nodes need, and nothing else.
+HOME_OF = {
+    'torch': {'ja_learning', 'ja_experiments'},
+    'mujoco': {'ja_sim'},
+    'numba': {'ja_experiments'},
+}
+
+
+def nodes_of(kind: type) -> Iterator[tuple[Path, ast.AST]]:
+    """Every syntax node of a kind in the sources, with its file."""
+    for path, tree in TREES.items():
+        for node in ast.walk(tree):
+            if isinstance(node, kind):
+                yield path, node
+
+
+def called(node: ast.AST | None) -> str:
+    """Name of the function or method that a call calls; '' when it is no call."""
+    function = getattr(node, 'func', None)
+    return getattr(function, 'id', getattr(function, 'attr', ''))
+
+
+def is_text(node: ast.AST | None) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, str)
+
+
+def test_sources_were_found():
+    assert len(PACKAGES) == 7
+    assert len(NODES) >= 8
+
+
+def test_every_parameter_has_a_description():
+    calls = [(path, node) for path, node in nodes_of(ast.Call) if called(node) == 'parameter']
+    assert len(calls) > 40
+    wrong = [
+        (path, node.lineno)
+        for path, node in calls
+        if len(node.args) < 2 or not is_text(node.args[1]) or not node.args[1].value.strip()
+    ]
+    assert not wrong
+
+
+def test_configurations_of_nodes_consist_of_described_parameters():
+    configured = {node.args[0].id for _, node in nodes_of(ast.Call) if called(node) == 'configure'}
+    assert len(configured) > 8
+    wrong = [
+        (path, cls.name, field.target.id)
+        for path, cls in nodes_of(ast.ClassDef)
+        if cls.name in configured
+        for field in cls.body
+        if isinstance(field, ast.AnnAssign) and called(field.value) != 'parameter'
+    ]
+    assert not wrong
+
+
+def test_parameters_are_declared_in_one_place():
+    """So that none escapes its description, its range and its check."""
+    declaring = {p for p, node in nodes_of(ast.Call) if called(node) == 'declare_parameter'}
+    assert declaring == {Path('ja_common/ja_common/parameters.py')}
+
+
+@pytest.mark.parametrize('path', NODES, ids=str)
+def test_node_module_ends_with_its_main(path):
+    functions = [node.name for node in TREES[path].body if isinstance(node, ast.FunctionDef)]
+    assert functions[-1] == 'main'
+    classes = [node.name for node in TREES[path].body if isinstance(node, ast.ClassDef)]
+    thing = path.stem.removesuffix('_node').title().replace('_', '')
+    assert f'{thing}Node' in classes
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_every_node_is_an_executable_of_its_package(package):
+    setup = ast.parse((SOURCES / package / 'setup.py').read_text())
+    scripts = {
+        node.value
+        for node in ast.walk(setup)
+        if is_text(node) and ':main' in node.value and '_node' in node.value
+    }
+    things = [path for path in NODES if path.parts[0] == package]
+    assert scripts == {
+        f'{path.stem.removesuffix("_node")} = {package}.{path.stem}:main' for path in things
+    }
+
+
+@pytest.mark.parametrize('library', HOME_OF)
+def test_heavy_library_is_loaded_only_where_it_is_at_home(library):
+    users = {
+        path.parts[0]
+        for path, node in nodes_of(ast.Import)
+        if any(alias.name.split('.')[0] == library for alias in node.names)
+    } | {
+        path.parts[0]
+        for path, node in nodes_of(ast.ImportFrom)
+        if (node.module or '').split('.')[0] == library
+    }
+    assert users <= HOME_OF[library]
+
+
+def test_relative_imports_stay_in_their_folder():
+    """What leaves it says its full name, so that the rules of the rooms see it."""
+    wrong = [(path, node.lineno) for path, node in nodes_of(ast.ImportFrom) if node.level > 1]
+    assert not wrong
+
+
+def test_topic_names_stand_in_their_table_alone():
+    """Nobody reaches a topic, least of all the truth, by writing its name."""
+    names = {topic.name for topic in TOPICS if '/' in topic.name}
+    wrong = [
+        (path, node.lineno, node.value)
+        for path, node in nodes_of(ast.Constant)
+        if isinstance(node.value, str)
+        and node.value.lstrip('/') in {name.lstrip('/') for name in names}
+        and path != Path('ja_common/ja_common/topics.py')
+    ]
+    assert not wrong
