@@ -70,10 +70,10 @@ class ThreeLayerNetwork:
         self.last_error_rad = float('nan')
 
     def predict(self, face: ArrayLike, posture: ArrayLike) -> NDArray[np.float64]:
-        """Proposed change of posture, shape (2,) [rad], for a face (30, 25) uint8 at a posture."""
+        """Proposed changes of posture (..., 2) [rad]: faces (..., 30, 25), postures (..., 2)."""
         with torch.no_grad():
-            output = self._forward(self._inputs(np.asarray(face), np.atleast_2d(posture)))
-        return output[0].numpy().astype(float) * self.config.angle_scale_rad
+            output = self._forward(self._inputs(np.asarray(face), np.asarray(posture, float)))
+        return output.numpy().astype(float) * self.config.angle_scale_rad
 
     def learn(self, trial: Trial) -> None:
         """Back-propagation on the pairs of one trial, one step a pair, in the order they came."""
@@ -128,8 +128,8 @@ class ThreeLayerNetwork:
     def _inputs(self, face: NDArray[Any], postures: NDArray[np.float64]) -> torch.Tensor:
         pixels = face_inputs(face, self.config.face_scaling)
         angles = postures / self.config.angle_scale_rad * self.config.posture_input
-        pixels = np.broadcast_to(pixels, (len(postures), face.size))
-        return torch.from_numpy(np.hstack([pixels, angles]).astype(np.float32))
+        pixels = np.broadcast_to(pixels, (*angles.shape[:-1], pixels.shape[-1]))
+        return torch.from_numpy(np.concatenate([pixels, angles], axis=-1).astype(np.float32))
 
 
 def face_inputs(faces: ArrayLike, scaling: str) -> NDArray[np.float64]:
