@@ -198,21 +198,22 @@ def test_missing_joint_states_are_named(make_graph):
 
 
 def test_after_a_hold_the_head_starts_from_its_measured_posture(make_graph):
-    graph = make_graph(stale_after_s=0.2)
-    graph.image()
-    graph.image()
+    graph = make_graph(stale_after_s=0.2, dwell_s=0.0)
+    for _ in range(2):
+        graph.image({FACE_DELTA: (0.0, 0.0), VF_DELTA: (0.3, 0.0)})
+    assert graph.status()[0].message == 'shift'
     graph.hold()
     graph.pan = 0.4  # somebody turned it
     assert graph.image().position[0] == pytest.approx(0.4)
-    assert graph.status()[0].message == 'look'
+    assert graph.status()[0].message == 'look', 'the shift that was under way is given up'
 
 
 def test_image_repeated_after_a_hold_is_answered_under_its_own_stamp(make_graph):
     """In lockstep the sim waits for exactly this answer."""
     graph = make_graph(stale_after_s=0.2)
-    graph.image()
-    graph.image()
-    graph.hold()
+    graph.image(age_s=0.01)
+    graph.image(age_s=0.01)
+    assert to_ns(graph.hold().header.stamp) != graph.stamp_ns
     graph.tell(FACE_RIGHT)
     assert to_ns(graph.bench.next(JOINT_COMMANDS).header.stamp) == graph.stamp_ns
 
@@ -236,8 +237,9 @@ def test_disabled_gate_holds_and_starts_from_where_the_head_stands(graph):
     graph.image()
     assert graph.bench.call(SetBool, 'enable', data=False).success
     held = graph.image()
-    for _ in range(2):
-        assert graph.image().position == held.position
+    for sag in (0.0, 0.02, -0.05):
+        graph.pan = held.position[0] + sag
+        assert graph.image(follow=False).position == held.position
     assert graph.status()[1]['reason'] == 'disabled'
     graph.pan = 0.2
     graph.bench.call(SetBool, 'enable', data=True)

@@ -24,6 +24,7 @@ def test_fixation_is_where_the_head_looked_when_the_image_was_taken(bench):
     """Not when the detections came: the newest joint state is far ahead."""
     for ms, pan in ((100, 0.1), (200, 0.1), (300, 0.9)):
         bench.say_posture(ms * MS, pan)
+    bench.wait(lambda: bench.received(JOINT_STATES) == 3)
     bench.say(DETECTIONS, encode_detections(header(150 * MS), [BALL]))
     fixation = bench.next(FIXATION)
     assert fixation.header == header(150 * MS)

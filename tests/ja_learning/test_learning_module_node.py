@@ -9,6 +9,7 @@ from ja_common.detection_codec import encode_detections
 from ja_common.image_codec import encode_image
 from ja_common.topics import DETECTIONS, FACE_IMAGE, FIXATION, JOINT_STATES, LM_DELTA
 from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
+from ja_learning.core.trial import Trial
 from ja_learning.learning_module_node import LearningModuleNode
 from node_bench import header, joint_state
 
@@ -34,6 +35,9 @@ class Life:
     def rest(self, pan, detections=()):
         return self._see(self._tick(pan), list(detections))
 
+    def pass_by(self, pan):
+        return self._see(self._tick(pan, velocity=[0.5, 0.0]), [])
+
     def fixate(self, pan, direction):
         self.rest(pan)
         before = self.bench.received(FIXATION)
@@ -51,9 +55,9 @@ class Life:
     def learned(self):
         return int(self.bench.node.health.values.get('trials learned', '0'))
 
-    def _tick(self, pan):
+    def _tick(self, pan, **more):
         self.ms += 100
-        self.bench.say_posture(self.ms * MS, pan)
+        self.bench.say_posture(self.ms * MS, pan, **more)
         return self.ms * MS
 
     def _see(self, stamp_ns, detections):
@@ -106,6 +110,17 @@ def test_fixation_teaches_the_trial_once(life):
     assert list(life.look().position) != before
     life.fixate(0.0, (0.4, 0.1))  # still where the look was: nothing was shifted
     assert life.learned == 1
+
+
+def test_postures_at_rest_are_taught_and_those_passed_on_the_way_are_not(life):
+    life.look()
+    life.pass_by(0.1)
+    life.rest(0.2)
+    life.pass_by(0.25)
+    life.fixate(0.3, (0.4, 0.1))
+    network = ThreeLayerNetwork(NetworkConfig(), seed=0)
+    network.learn(Trial(FACE, np.array([(0.0, 0.0), (0.2, 0.0)]), np.array((0.4, 0.1))))
+    assert list(life.look().position) == pytest.approx(network.predict(FACE, (0, 0)), abs=1e-7)
 
 
 def test_learning_moves_the_proposal_towards_the_fixation(make_life):

@@ -91,12 +91,12 @@ def test_every_image_comes_with_clock_posture_intrinsics_and_truth(make_rig):
 
 
 def test_head_obeys_and_time_passes_only_with_a_command_for_the_last_image(make_rig):
-    rig = make_rig()
+    rig = make_rig(resend_after_s=0.05)
     first = stamp(rig.image)
     rig.command(0.2, 0.1, stamp_ns=first - PERIOD_NS)  # an answer to another image
-    rig.step(0.1, -0.05)
-    assert stamp(rig.image) == first + PERIOD_NS
-    for _ in range(5):
+    rig.bench.wait(lambda: rig.bench.received(JOINT_COMMANDS) == 1)
+    assert stamp(rig.bench.next(IMAGE, count=2)) == first
+    for _ in range(6):
         rig.step(0.1, -0.05)
     assert stamp(rig.image) == first + 6 * PERIOD_NS
     posture = JointCodec(JointConfig()).decode(rig.at_image(JOINT_STATES))
