@@ -53,6 +53,16 @@ def test_image_waits_for_the_joint_states_of_its_time(bench):
     assert bench.next(FIXATION).position[0] == pytest.approx(0.2 - math.atan(0.05))
 
 
+def test_clock_set_back_is_survived_even_while_an_image_waits(bench):
+    bench.say_posture(90_000 * MS)
+    bench.say(DETECTIONS, encode_detections(header(90_100 * MS), [BALL]))
+    bench.wait(lambda: bench.received(DETECTIONS) == 1)
+    for ms in (1_000, 1_100):
+        bench.say_posture(ms * MS)
+    bench.say(DETECTIONS, encode_detections(header(1_050 * MS), [BALL]))
+    assert bench.next(FIXATION).header == header(1_050 * MS)
+
+
 @pytest.mark.parametrize(
     ('message', 'text'),
     [
