@@ -33,7 +33,7 @@ POOL = 125
 """How many data sets the paper learns from."""
 FRESH = 1000
 """How many more looks at the same person there are to test on."""
-_IMAGE_SIZE = (320, 240)
+IMAGE_SIZE = (320, 240)
 _ASIDE_RAD = (0.35, 0.0)
 _MADE_BY = ('ja_common', 'ja_perception', 'ja_control', 'ja_sim')
 _LIBRARIES = ('mujoco', 'numpy', 'opencv-python-headless')
@@ -182,7 +182,7 @@ def _render(scene: str, seed: int, count: int, progress: Callable[[int], None]) 
     config = ExperimentConfig().with_settings(
         {'dwell_s': DWELL_S, 'max_shifts': 1, 'gating': 'constant', 'p_lm_max': 1.0}
     )
-    world = JointAttentionWorld(load_scene(scene), seed, _IMAGE_SIZE)
+    world = JointAttentionWorld(load_scene(scene), seed, IMAGE_SIZE)
     task = RenderedTask(world, Robot(config, _LooksAside(), np.random.default_rng(seed)))
     faces: list[NDArray] = []
     postures: list[NDArray] = []
