@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from ja_common.core.detection import Kind
+from ja_common.core.geometry import directions_of_rays, rays_of_directions
 from ja_common.core.posture import Posture
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.detector import DetectorConfig, SalientFeatureDetector
 from ja_perception.core.salient_objects import InterestConfig
+from ja_sim.core.digital_head import DigitalHead, DigitalHeadConfig
 from synthetic_pictures import draw_ball, draw_face, room
 
 FIELD_OF_VIEW = np.radians(36)
@@ -107,26 +109,32 @@ def test_face_image_shows_the_look(finder):
 
 def test_a_panned_scene_does_not_move_but_a_mover_does(finder):
     detector = SalientFeatureDetector(finder, interest(0, 0, 1))
-    wall = np.random.default_rng(2).integers(90, 160, (30, 100), np.uint8)
+    head = DigitalHead(DigitalHeadConfig(speed_rad_s=100.0, time_constant_s=0.001))
+    wall = np.random.default_rng(2).integers(90, 160, (60, 80), np.uint8)
     wall = np.kron(wall, np.ones((8, 8), np.uint8))
-    for k in range(6):
-        left = 200 + 20 * k  # the head turns right by 20 px an image
-        picture = np.dstack([wall[:240, left : left + 320]] * 3).copy()
-        draw_ball(picture, 100 + 6 * k, 120, 15, (255, 255, 255))
-        pan = -np.arctan(20 * k / CAMERA.fx)
-        percept = detector.look(picture, (k + 1) * STEP_NS, CAMERA, at((pan, 0)))
-        assert percept.motion_judged is (k > 0)
-        if 0 < k < 3:  # a flat wall is no sphere: far from the axis it does shift
-            assert percept.target is not None
-            assert percept.target.u == pytest.approx(100 + 6 * k, abs=16)
-            assert len(percept.detections) == 1
+    head.command((0.12, 0.0))
+    head.look(np.zeros((480, 640, 3), np.uint8), 0)
+    for k in range(1, 11):
+        wide = np.dstack([wall] * 3)
+        draw_ball(wide, 240 + 14 * k, 240, 16, (255, 255, 255))
+        head.command((0.15 - 0.03 * k, 0.0))
+        view, posture = head.look(wide, k * STEP_NS)
+        percept = detector.look(view, k * STEP_NS, CAMERA, posture)
+        assert percept.motion_judged is (k > 2)
+        if k > 2:
+            ball = (240 + 14 * k - 319.5, 0.5) / np.array(320 / np.tan(np.radians(30)))
+            expected = rays_of_directions(posture.position, directions_of_rays((0, 0), ball))
+            (mover,) = percept.detections
+            assert mover.ray == pytest.approx(expected, abs=0.04)
 
 
 def test_motion_is_not_judged_while_the_head_is_fast(finder):
     detector = SalientFeatureDetector(finder, interest(0, 0, 1))
-    detector.look(room(), STEP_NS, CAMERA, at())
+    for k in (1, 2, 3):
+        percept = detector.look(room(), k * STEP_NS, CAMERA, at())
+    assert percept.motion_judged
     picture = caregiver_and_ball()
-    percept = detector.look(picture, 2 * STEP_NS, CAMERA, at(velocity=(3.0, 0)))
+    percept = detector.look(picture, 4 * STEP_NS, CAMERA, at(velocity=(3.0, 0)))
     assert not percept.motion_judged
     assert percept.target is None
 

@@ -17,6 +17,7 @@ from ja_perception.core.face_watch import FaceConfig, FaceWatch
 from ja_perception.core.faces import FaceFinder
 from ja_perception.core.features import FeatureConfig
 from ja_perception.core.grouping import GroupingConfig
+from ja_perception.core.motion import MotionConfig
 from ja_perception.core.object_tracking import TrackingConfig
 from ja_perception.core.salient_objects import InterestConfig, SalientObject, SalientObjects
 
@@ -44,6 +45,7 @@ class DetectorConfig:
     attention: AttentionConfig = field(default_factory=AttentionConfig)
     interest: InterestConfig = field(default_factory=InterestConfig)
     features: FeatureConfig = field(default_factory=FeatureConfig)
+    motion: MotionConfig = field(default_factory=MotionConfig)
     grouping: GroupingConfig = field(default_factory=GroupingConfig)
     tracking: TrackingConfig = field(default_factory=TrackingConfig)
     faces: FaceConfig = field(default_factory=FaceConfig)
@@ -56,13 +58,14 @@ class Percept:
     ``detections``: the caregiver's face first, other faces, then objects, most salient first.
     ``face_image``: (30, 25) uint8 while the head attends to the caregiver, cut from
     ``face_image_box`` [px]; else both are None. ``motion_judged``: False where motion could not be
-    told (first image, head too fast).
+    told (first images, head too fast). ``moving_share``: share of the image that moves.
     """
 
     detections: list[Detection]
     face_image: NDArray[np.uint8] | None
     face_image_box: Box | None
     motion_judged: bool
+    moving_share: float
 
     @property
     def target(self) -> Detection | None:
@@ -84,7 +87,7 @@ class SalientFeatureDetector:
         config = self._config
         self._faces = FaceWatch(self._finder, config.faces)
         self._objects = SalientObjects(
-            config.interest, config.features, config.grouping, config.tracking
+            config.interest, config.features, config.motion, config.grouping, config.tracking
         )
 
     def look(
@@ -119,7 +122,13 @@ class SalientFeatureDetector:
             for index, (face, box) in enumerate(zip(faces, boxes, strict=True))
         ]
         object_rows = [_object_row(item, camera) for item in objects]
-        return Percept(face_rows + object_rows, face_image, crop_box, self._objects.motion_judged)
+        return Percept(
+            face_rows + object_rows,
+            face_image,
+            crop_box,
+            self._objects.motion_judged,
+            self._objects.moving_share,
+        )
 
     def _attends(self, ray: NDArray[np.float64], posture: Posture | None) -> bool:
         """Does the head rest with the ray (x, y) in the centre (Eq. 3)?"""

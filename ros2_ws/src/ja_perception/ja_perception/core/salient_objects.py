@@ -13,21 +13,19 @@ from ja_common.core.geometry import directions_of_rays
 from ja_common.core.posture import Posture
 from ja_perception.core.box import Box
 from ja_perception.core.camera_model import CameraModel
-from ja_perception.core.ego_motion import expected_image, rotation_homography
-from ja_perception.core.features import (
-    FeatureConfig,
-    Mask,
-    colour_map,
-    edge_map,
-    motion_map,
+from ja_perception.core.features import ColourMap, FeatureConfig, Mask, colour_map, edge_map
+from ja_perception.core.grouping import (
+    Grouping,
+    GroupingConfig,
+    Region,
+    merged,
+    texture_window,
 )
-from ja_perception.core.grouping import Grouping, GroupingConfig, merged, texture_window
+from ja_perception.core.motion import MotionConfig, MotionDetector
 from ja_perception.core.object_tracking import ObjectTracker, TrackingConfig
-from ja_perception.core.undistortion import bent, straightened
 
 # The area within d_th of the centre (Eq. 3) at unit focal length: the measure of f_col and f_mot.
 _GAZING_AREA = math.pi * math.tan(WIDTH_SIXTH) ** 2
-_MOTION_WIDTH_PX = 160
 
 
 @dataclass(frozen=True)
@@ -39,9 +37,6 @@ class InterestConfig:
     alpha_mot: float = parameter(0.0, 'alpha 3 of Eq. 1: interest in motion', low=0.0)
     work_width_px: int = parameter(
         320, 'features are computed on images of at most this width', low=32, high=4096
-    )
-    motion_below_rad_s: float = parameter(
-        1.6, 'faster than this the picture blurs, and no motion is reported', low=0.0, high=100.0
     )
 
 
@@ -62,12 +57,12 @@ class SalientObject:
 
 
 @dataclass(frozen=True)
-class _Before:
-    """The previous image, for the motion between the two."""
+class _Maps:
+    """The feature maps of one working image, without people's heads."""
 
-    grey: Mask
-    position: NDArray[np.float64]
-    stamp_ns: int
+    colour: ColourMap
+    edges: Mask
+    moving: Mask
 
 
 class SalientObjects:
@@ -77,6 +72,7 @@ class SalientObjects:
         self,
         interest: InterestConfig,
         features: FeatureConfig,
+        motion: MotionConfig,
         grouping: GroupingConfig,
         tracking: TrackingConfig,
     ) -> None:
@@ -84,9 +80,11 @@ class SalientObjects:
         self._features = features
         self._grouping = Grouping(grouping)
         self._tracker = ObjectTracker(tracking)
-        self._before: _Before | None = None
+        self._motion = MotionDetector(motion, features)
         self.motion_judged = False
-        """Could motion be told in the last image? Not in the first, nor while the head is fast."""
+        """Could motion be told in the last image? See ``MotionDetector.moving``."""
+        self.moving_share = 0.0
+        """Share of the last image that moved."""
 
     def find(
         self,
@@ -103,65 +101,66 @@ class SalientObjects:
         """
         scale = min(1.0, self._interest.work_width_px / image.shape[1])
         work = _scaled(image, scale)
-        height, width = work.shape[:2]
-        work_camera = camera.resized(width, height)
-        position = np.zeros(2) if posture is None else posture.position
+        work_camera = camera.resized(work.shape[1], work.shape[0])
+        work_heads = [_rescaled(head, scale) for head in heads]
+        maps = self._maps(work, stamp_ns, work_camera, posture, work_heads)
+        regions = self._regions(maps)
+        features = _features(regions, maps, work_camera)
 
+        interest = self._interest
+        # Eq. 1
+        saliency = features @ (interest.alpha_col, interest.alpha_edg, interest.alpha_mot)
+        boxes = [_rescaled(region.box, 1 / scale) for region in regions]
+        rays = camera.rays(np.array([(box.u, box.v) for box in boxes]).reshape(-1, 2))
+        position = np.zeros(2) if posture is None else posture.position
+        ids = self._tracker.update(directions_of_rays(position, rays), stamp_ns)
+        scores = self._tracker.held(ids, saliency.tolist(), stamp_ns)
+        rows = zip(boxes, ids, scores, features.tolist(), strict=True)
+        objects = [SalientObject(box, track, score, *f) for box, track, score, f in rows]
+        return sorted(objects, key=lambda item: -item.score)
+
+    def _maps(
+        self,
+        work: NDArray[np.uint8],
+        stamp_ns: int,
+        camera: CameraModel,
+        posture: Posture | None,
+        heads: list[Box],
+    ) -> _Maps:
         colour = colour_map(work, self._features)
         grey = cv2.cvtColor(work, cv2.COLOR_RGB2GRAY)
         edges = edge_map(grey, self._features)
-        moving = self._motion(grey, work_camera, posture, stamp_ns)
+        moving = self._motion.moving(grey, stamp_ns, camera, posture)
+        self.motion_judged = moving is not None
+        if moving is None:
+            moving = np.zeros_like(grey)
+        self.moving_share = float(moving.mean())
         for head in heads:
             for feature in (colour.bright, edges, moving):
-                _blank(feature, _rescaled(head, scale))
+                _blank(feature, head)
+        return _Maps(colour, edges, moving)
 
+    def _regions(self, maps: _Maps) -> list[Region]:
         interest = self._interest
-        regions = merged(
-            self._grouping.by_colour(colour) if interest.alpha_col else [],
-            self._grouping.by_motion(moving) if interest.alpha_mot else [],
-            self._grouping.by_texture(edges) if interest.alpha_edg else [],
+        return merged(
+            self._grouping.by_colour(maps.colour) if interest.alpha_col else [],
+            self._grouping.by_motion(maps.moving) if interest.alpha_mot else [],
+            self._grouping.by_texture(maps.edges) if interest.alpha_edg else [],
         )
-        boxes = [region.box for region in regions]
-        gazing_px = _GAZING_AREA * work_camera.fx * work_camera.fy
-        # x / (1 + x): grows with the area but stays below 1, so that no two sizes are equal.
-        bright = np.array([region.bright_px for region in regions]) / gazing_px
-        moved = _amounts(moving, boxes) / gazing_px
-        judged = np.array([max(box.area, texture_window(edges) ** 2) for box in boxes])
-        f_col, f_mot = bright / (1 + bright), moved / (1 + moved)
-        f_edg = np.minimum(1, _amounts(edges, boxes) / judged)
-        saliency = (
-            interest.alpha_col * f_col + interest.alpha_edg * f_edg + interest.alpha_mot * f_mot
-        )
-        boxes = [_rescaled(box, 1 / scale) for box in boxes]
-        rays = camera.rays(np.array([(box.u, box.v) for box in boxes]).reshape(-1, 2))
-        ids = self._tracker.update(directions_of_rays(position, rays), stamp_ns)
-        scores = self._tracker.held(ids, saliency.tolist(), stamp_ns)
-        features = (f_col.tolist(), f_edg.tolist(), f_mot.tolist())
-        rows = zip(boxes, ids, scores, *features, strict=True)
-        objects = [SalientObject(*row) for row in rows]
-        return sorted(objects, key=lambda o: -o.score)
 
-    def _motion(
-        self, grey: Mask, camera: CameraModel, posture: Posture | None, stamp_ns: int
-    ) -> Mask:
-        """The motion map, of the size of ``grey``, judged on a smaller image: motion is coarse."""
-        height, width = grey.shape
-        small = _scaled(grey, min(1.0, _MOTION_WIDTH_PX / width))
-        camera = camera.resized(small.shape[1], small.shape[0])
-        small = straightened(small, camera)
-        position = np.zeros(2) if posture is None else posture.position
-        before, self._before = self._before, _Before(small, position, stamp_ns)
-        slow = posture is None or posture.is_still(self._interest.motion_below_rad_s)
-        comparable = (
-            before is not None and before.grey.shape == small.shape and before.stamp_ns < stamp_ns
-        )
-        self.motion_judged = slow and comparable
-        if before is None or not self.motion_judged:
-            return np.zeros_like(grey)
-        homography = rotation_homography(camera, position, before.position)
-        expected, seen_before = expected_image(before.grey, homography)
-        moving = bent(motion_map(small, expected, seen_before, self._features), camera)
-        return cv2.resize(moving, (width, height), interpolation=cv2.INTER_NEAREST)
+
+def _features(regions: list[Region], maps: _Maps, camera: CameraModel) -> NDArray[np.float64]:
+    """f_col, f_edg and f_mot of each region, shape (n, 3)."""
+    boxes = [region.box for region in regions]
+    gazing_px = _GAZING_AREA * camera.fx * camera.fy
+    bright = np.array([region.bright_px for region in regions]) / gazing_px
+    moved = _amounts(maps.moving, boxes) / gazing_px
+    # In less than a window of texture, a few edges would seem dense.
+    window_px = texture_window(maps.edges) ** 2
+    judged_px = np.array([max(box.area, window_px) for box in boxes])
+    f_edg = np.minimum(1, _amounts(maps.edges, boxes) / judged_px)
+    # x / (1 + x) grows with the area but stays below 1, so that no two sizes are equal.
+    return np.stack([bright / (1 + bright), f_edg, moved / (1 + moved)], axis=-1)
 
 
 def _scaled(image: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:

@@ -13,6 +13,10 @@ _SCALES = 0.2 * 1.15 ** np.arange(9)
 _TEMPLATE_PX = 32
 
 
+# Confidence that the teacher needs.
+_SURE = 0.8
+
+
 class TemplateFaces:
     """Finds again the first face that another finder (the ``teacher``) has shown it.
 
@@ -31,6 +35,8 @@ class TemplateFaces:
         """See ``FaceFinder.find``."""
         if self._template is None:
             taught = self._teacher.find(image, square)
+            # Its false alarms would be found for ever.
+            taught = [face for face in taught if face.score >= _SURE]
             if taught:
                 self._template = _grey(image, _squared(taught[0].box), _TEMPLATE_PX)
             return taught
