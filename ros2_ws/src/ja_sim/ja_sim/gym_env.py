@@ -88,7 +88,7 @@ class JointAttentionEnv(gymnasium.Env):
         truncated = fixated is None and self._shifts >= self._max_shifts
         return self._observation(), reward, fixated is not None, truncated, info
 
-    def render(self) -> np.ndarray | None:  # type: ignore[override]
+    def render(self) -> np.ndarray | None:
         """What the robot sees."""
         return self._world.observe().image if self.render_mode == 'rgb_array' else None
 

@@ -14,7 +14,12 @@ from importlib import resources
 import mujoco
 import numpy as np
 
-from ja_common.core.geometry import angle_between, directions_of_vectors, head_rotation
+from ja_common.core.geometry import (
+    angle_between,
+    directions_of_vectors,
+    head_rotation,
+    rays_of_directions,
+)
 
 from .behaviour import ROBOT, Blinking, CaregiverBehaviour
 from .camera import Intrinsics, Observation, expose
@@ -121,6 +126,7 @@ class JointAttentionWorld:
         self._behaviour = CaregiverBehaviour(self.scene.caregiver, behaviour)
         self._blinking = Blinking(self.scene.caregiver.blink_rate_hz, blinks)
         self._attended, self._elsewhere, self._in_view = ROBOT, np.zeros(3), False
+        self._turned_s = 0.0
         self._film: deque[_View] = deque([self._view()])
         self._observation: Observation | None = None
         self._sample = self._head.read_encoders(self._now_ns, self._encoder_rng)
@@ -240,7 +246,9 @@ class JointAttentionWorld:
         if self._attended == ROBOT:
             share, noise = 1.0, np.zeros(2)
         target = self._caregiver.to_rest_frame(self._gaze_point())
-        self._gaze.start(self._time_s + spec.reaction_s, spec.turn_s, target, share, noise)
+        start_s = self._time_s + spec.reaction_s
+        self._gaze.start(start_s, spec.turn_s, target, share, noise)
+        self._turned_s = start_s + spec.turn_s
 
     def _gaze_point(self) -> np.ndarray:
         """The point she means to look at, (3,) [m]: the robot's camera is the origin."""
@@ -255,7 +263,7 @@ class JointAttentionWorld:
 
     def _positions(self) -> np.ndarray:
         """Where the objects are now, (N, 3) [m]."""
-        shaken = self._attended if self.scene.caregiver.shows_object == 'shakes' else ROBOT
+        shaken = self._shown() if self.scene.caregiver.shows_object == 'shakes' else ROBOT
         return np.array(
             [
                 thing.position_at(self._time_s, shaken=index == shaken)
@@ -264,15 +272,21 @@ class JointAttentionWorld:
         )
 
     def _hand(self) -> np.ndarray | None:
-        """Where her hand is, (3,) [m], if she holds the object that she attends to."""
-        if self.scene.caregiver.shows_object != 'holds' or self._attended == ROBOT:
+        """Where her hand is, (3,) [m], if she holds an object."""
+        held = self._shown()
+        if self.scene.caregiver.shows_object != 'holds' or held == ROBOT:
             return None
-        below = np.array([0.0, 0.0, self._arrangement.things[self._attended].radius_m])
-        return self._positions()[self._attended] - below
+        return self._positions()[held] - [0.0, 0.0, self._arrangement.things[held].radius_m]
+
+    def _shown(self) -> int:
+        """The object that she would shake or hold: the one she has turned to."""
+        turned = self._time_s >= self._turned_s and self._behaviour.look.reliable
+        return self._attended if turned else ROBOT
 
     def _is_in_view(self, direction: np.ndarray) -> bool:
         view = np.radians([self.scene.head.view_pan_deg, self.scene.head.view_tilt_deg])
-        return bool(np.all(np.abs(direction - self._head.posture) < view))
+        ray = rays_of_directions(self._head.posture, direction)
+        return bool(np.all(np.abs(ray) < np.tan(view)))
 
     def _view(self) -> _View:
         return _View(
