@@ -147,8 +147,7 @@ def test_clock_set_back_forgets():
 
 
 def test_scan_goes_round_and_covers_every_place_with_small_squares():
-    image = np.zeros((480, 640, 3), np.uint8)
-    squares = scan_squares(image, 200)
+    squares = scan_squares(640, 480, 200)
     assert squares[0] == Box(319.5, 239.5, 640, 640)
     smallest = min(square.width for square in squares)
     assert 200 <= smallest < 334

@@ -65,8 +65,10 @@ def speed(images: int = 300) -> dict[str, Row]:
     for size in ((160, 120), (320, 240), (640, 480)):
         views = list(_shaken(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), images))
         name = f'{size[0]}x{size[1]}'
-        faceless = SalientFeatureDetector(_NoFaces())
-        rows |= _times(f'features and grouping {name}', _looks(faceless, views))
+        for features in ('colour', 'all'):
+            config = DetectorConfig(interest=InterestConfig(*FEATURES[features]))
+            faceless = SalientFeatureDetector(_NoFaces(), config)
+            rows |= _times(f'{features}: features, grouping {name}', _looks(faceless, views))
         rows |= _times(f'whole node {name}', _messages(SalientFeatureDetector(BlazeFace()), views))
     return rows
 
@@ -194,7 +196,7 @@ def attend(frames: Iterator[Picture], images: int = 60) -> dict[str, list[float]
 class _NoFaces:
     """A finder for measurements without faces."""
 
-    smallest_share = 1.0
+    smallest_share = 0.01
 
     def find(self, image: Picture, square: Any) -> list[Any]:
         return []

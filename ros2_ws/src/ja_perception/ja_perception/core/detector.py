@@ -57,8 +57,9 @@ class Percept:
 
     ``detections``: the caregiver's face first, other faces, then objects, most salient first.
     ``face_image``: (30, 25) uint8 while the head attends to the caregiver, cut from
-    ``face_image_box`` [px]; else both are None. ``motion_judged``: False where motion could not be
-    told (first images, head too fast). ``moving_share``: share of the image that moves.
+    ``face_image_box`` [px]; else both are None. ``motion_judged``: False where motion could not
+    be told (alpha_mot = 0, the first images, a fast head). ``moving_share``: share of the image
+    that moves.
     """
 
     detections: list[Detection]

@@ -6,6 +6,7 @@ and one at the next place of a scan that goes round the picture in squares of se
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -192,7 +193,8 @@ class FaceWatch:
         return (stamp_ns - before) / NS_PER_S
 
     def _find(self, view: _View, expected: list[WatchedFace]) -> list[Face]:
-        whole = whole_square(view.image)
+        height, width = view.grey.shape
+        whole = whole_square(width, height)
         squares: list[Box] = []
         caregiver = self._caregiver
         if caregiver is not None and caregiver in expected:
@@ -202,7 +204,7 @@ class FaceWatch:
             else:
                 squares.append(look_at(box, whole))
         if self._scan_is_due():
-            places = scan_squares(view.image, self._smallest_square(view.image))
+            places = scan_squares(width, height, self._smallest_square(width))
             self._scan_place = (self._scan_place + 1) % len(places)
             if places[self._scan_place] not in squares:
                 squares.append(places[self._scan_place])
@@ -216,8 +218,8 @@ class FaceWatch:
                     found += self._second_look(view.image, face, square, whole)
         return without_doubles(found)
 
-    def _smallest_square(self, image: NDArray[np.uint8]) -> float:
-        smallest_px = max(self._config.smallest_face_share * image.shape[1], _LEAST_FACE_PX)
+    def _smallest_square(self, width: int) -> float:
+        smallest_px = max(self._config.smallest_face_share * width, _LEAST_FACE_PX)
         return smallest_px / self._finder.smallest_share
 
     def _scan_is_due(self) -> bool:
@@ -260,9 +262,8 @@ class FaceWatch:
             self._caregiver = None
 
 
-def whole_square(image: NDArray[np.uint8]) -> Box:
-    """The square that holds the whole image, concentric with it."""
-    height, width = image.shape[:2]
+def whole_square(width: int, height: int) -> Box:
+    """The square that holds a whole image, concentric with it."""
     side = max(width, height)
     return Box((width - 1) / 2, (height - 1) / 2, side, side)
 
@@ -273,10 +274,10 @@ def look_at(face: Box, whole: Box) -> Box:
     return whole if side > _NEARLY_WHOLE * whole.width else Box(face.u, face.v, side, side)
 
 
-def scan_squares(image: NDArray[np.uint8], smallest: float) -> list[Box]:
-    """Squares that cover the image at several sizes, overlapping, the largest first."""
-    height, width = image.shape[:2]
-    squares = [whole_square(image)]
+@lru_cache(maxsize=8)
+def scan_squares(width: int, height: int, smallest: float) -> list[Box]:
+    """Squares that cover an image at several sizes, overlapping, the largest first."""
+    squares = [whole_square(width, height)]
     side = squares[0].width * _SCAN_STEP
     while side >= smallest:
         squares += [

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 HUES = 180
 """OpenCV's hues, in steps of two degrees."""
 _BLUR = 4
+# Hues within such an arc need no closer look.
+_ONE_HUE = 20
 # A hue is a peak of its own when it is this large beside the largest peak, and when the valleys
 # beside it are lower than this share of it.
 _LEAST_PEAK, _VALLEY = 0.1, 0.4
@@ -14,6 +16,10 @@ _LEAST_PEAK, _VALLEY = 0.1, 0.4
 
 def hue_families(histogram: NDArray[np.float32]) -> NDArray[np.intp] | None:
     """Family number of each of the 180 hues, shape (180,); None when all are of one family."""
+    used = np.flatnonzero(histogram)
+    unused = np.diff(used, append=used[:1] + HUES)
+    if HUES - unused.max(initial=0) < _ONE_HUE:
+        return None
     ring = np.tile(histogram, 3)[None]
     smooth = cv2.GaussianBlur(ring, (0, 0), _BLUR)[0, HUES : 2 * HUES]
     is_peak = (smooth > np.roll(smooth, 1)) & (smooth >= np.roll(smooth, -1))

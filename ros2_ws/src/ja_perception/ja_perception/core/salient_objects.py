@@ -30,13 +30,13 @@ _GAZING_AREA = math.pi * math.tan(WIDTH_SIXTH) ** 2
 
 @dataclass(frozen=True)
 class InterestConfig:
-    """The coefficients of Eq. 1. A feature of no interest extracts no objects either."""
+    """The coefficients of Eq. 1. A feature of no interest is not computed, and counts as 0."""
 
     alpha_col: float = parameter(1.0, 'alpha 1 of Eq. 1: interest in bright colour', low=0.0)
     alpha_edg: float = parameter(0.0, 'alpha 2 of Eq. 1: interest in texture', low=0.0)
     alpha_mot: float = parameter(0.0, 'alpha 3 of Eq. 1: interest in motion', low=0.0)
     work_width_px: int = parameter(
-        320, 'features are computed on images of at most this width', low=32, high=4096
+        160, 'features are computed on images of at most this width', low=32, high=4096
     )
 
 
@@ -82,7 +82,7 @@ class SalientObjects:
         self._tracker = ObjectTracker(tracking)
         self._motion = MotionDetector(motion, features)
         self.motion_judged = False
-        """Could motion be told in the last image? See ``MotionDetector.moving``."""
+        """Was motion told in the last image? See ``MotionDetector.moving``."""
         self.moving_share = 0.0
         """Share of the last image that moved."""
 
@@ -127,13 +127,18 @@ class SalientObjects:
         posture: Posture | None,
         heads: list[Box],
     ) -> _Maps:
-        colour = colour_map(work, self._features)
+        interest = self._interest
         grey = cv2.cvtColor(work, cv2.COLOR_RGB2GRAY)
-        edges = edge_map(grey, self._features)
-        moving = self._motion.moving(grey, stamp_ns, camera, posture)
+        nothing = np.zeros_like(grey)
+        colour, edges, moving = ColourMap(nothing, nothing), nothing, None
+        if interest.alpha_col:
+            colour = colour_map(work, self._features)
+        if interest.alpha_edg:
+            edges = edge_map(grey, self._features)
+        if interest.alpha_mot:
+            moving = self._motion.moving(grey, stamp_ns, camera, posture)
         self.motion_judged = moving is not None
-        if moving is None:
-            moving = np.zeros_like(grey)
+        moving = nothing if moving is None else moving
         self.moving_share = float(moving.mean())
         for head in heads:
             for feature in (colour.bright, edges, moving):
