@@ -12,11 +12,13 @@ from scipy.stats import t
 
 SEEDS = (1, 2, 3)
 OBJECTS = 3
+# By trials, not by time: a busy machine must not mean less practice.
+PRACTICE = ('--trials', '1000', '--time', '900')
 
 
 def learner_alone(seed: int, folder: Path) -> dict[str, float]:
     """Success rates of the learner alone in the exams of one demo."""
-    demo = [sys.executable, '-m', 'ja_bringup.cli', 'demo', '--seed', str(seed)]
+    demo = [sys.executable, '-m', 'ja_bringup.cli', 'demo', '--seed', str(seed), *PRACTICE]
     ran = subprocess.run(demo, cwd=folder, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stdout + ran.stderr
     [path] = folder.glob('runs/*-demo/success_curve.csv')
