@@ -92,20 +92,21 @@ class _Process:
             self.popen.send_signal(number)
 
     def last_lines(self) -> str:
-        text = self._read(self._starts_at)
-        return '\n'.join(f'  {line}' for line in text.splitlines()[-_TAIL_LINES:])
+        lines = self._read(self._starts_at).decode(errors='replace').splitlines()
+        return '\n'.join(f'  {line}' for line in lines[-_TAIL_LINES:])
 
     def news(self) -> list[str]:
         """Errors that the node has logged since the last call."""
-        text = self._read(self._shown_to)
-        complete = text[: text.rfind('\n') + 1]
-        self._shown_to += len(complete.encode())
-        return [line for line in complete.splitlines() if line.startswith(_WORTH_SHOWING)]
+        written = self._read(self._shown_to)
+        complete = written[: written.rfind(b'\n') + 1]
+        self._shown_to += len(complete)
+        lines = complete.decode(errors='replace').splitlines()
+        return [line for line in lines if line.startswith(_WORTH_SHOWING)]
 
-    def _read(self, start: int) -> str:
+    def _read(self, start: int) -> bytes:
         with self._log.open('rb') as log:
             log.seek(start)
-            return log.read().decode(errors='replace')
+            return log.read()
 
 
 class Supervisor:
