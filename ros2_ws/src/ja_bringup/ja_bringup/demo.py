@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from ja_bringup.course import Course, Stage
 from ja_bringup.graph import NodeSpec
 from ja_bringup.progress import WINDOW_TRIALS, ProgressNode, rate_text
-from ja_bringup.report import draw_png, write_csv
 from ja_bringup.run import new_run_folder, run_graph
 from ja_bringup.supervisor import OnDeath
 
@@ -38,6 +37,9 @@ def run_demo(
     for line in summary(watcher, stages):
         print(line)
     if watcher.curve.records:
+        # matplotlib only now: before the run it would keep the first node waiting.
+        from ja_bringup.report import draw_png, write_csv
+
         print(f'success curve: {write_csv(watcher.curve, folder)}')
         print(f'               {draw_png(watcher.curve, folder, WINDOW_TRIALS)}')
     return code
