@@ -9,7 +9,9 @@ import pytest
 
 from ja_common.core.config import ConfigError
 from ja_common.core.geometry import angle_between, rays_of_directions
+from ja_sim.core import graphics
 from ja_sim.core.caregiver import SKIN_TONES, identities
+from ja_sim.core.graphics import RenderError
 from ja_sim.core.scene import Scene, load_scene
 from ja_sim.core.specs import HEAD_PRESETS
 from ja_sim.core.world import JointAttentionWorld
@@ -350,18 +352,25 @@ def test_nothing_but_objects_is_bright(make_world):
             assert hsv[..., 1][lit].max() < 255 * skin
 
 
-def test_renderer_refuses_an_unknown_backend(monkeypatch):
-    from ja_sim.core.render import RenderError
-
+def test_an_unknown_backend_is_refused(monkeypatch):
     monkeypatch.setenv('MUJOCO_GL', 'glfw')
     with pytest.raises(RenderError, match="renders with 'egl' or 'osmesa'"):
         JointAttentionWorld(load_scene('default'), 0, SMALL).observe()
 
 
 def test_missing_graphics_name_the_packages(monkeypatch):
-    from ja_sim.core import render
-
     monkeypatch.delenv('MUJOCO_GL', raising=False)
-    monkeypatch.setattr(render.ctypes.util, 'find_library', lambda name: None)
-    with pytest.raises(render.RenderError, match='apt install libegl1 libgl1-mesa-dri'):
+    monkeypatch.setattr(graphics.ctypes.util, 'find_library', lambda name: None)
+    with pytest.raises(RenderError, match='apt install libegl1 libgl1-mesa-dri'):
         JointAttentionWorld(load_scene('default'), 0, SMALL).observe()
+    # A library that is named but missing is told before MuJoCo fails to load it.
+    monkeypatch.setenv('MUJOCO_GL', 'osmesa')
+    with pytest.raises(RenderError, match='MUJOCO_GL=osmesa is not there'):
+        graphics.require_named_backend()
+
+
+def test_osmesa_is_the_fallback(monkeypatch):
+    monkeypatch.delenv('MUJOCO_GL', raising=False)
+    only_osmesa = {'OSMesa': 'libOSMesa.so.8'}
+    monkeypatch.setattr(graphics.ctypes.util, 'find_library', only_osmesa.get)
+    assert graphics.backend() == 'osmesa'

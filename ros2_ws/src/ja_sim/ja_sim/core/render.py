@@ -1,14 +1,8 @@
-"""Pictures without a display: an OpenGL context of its own, and the camera model.
-
-MuJoCo draws through EGL (Mesa's software rasteriser needs no GPU) or, where EGL is missing,
-through OSMesa. ``MUJOCO_GL=egl`` or ``osmesa`` overrules the choice.
-"""
+"""Pictures without a display: an OpenGL context of its own for one camera of a scene."""
 
 from __future__ import annotations
 
-import ctypes.util
 import importlib
-import os
 import weakref
 from typing import Any
 
@@ -16,33 +10,21 @@ import cv2
 import mujoco
 import numpy as np
 
-_LIBRARIES = {'egl': 'EGL', 'osmesa': 'OSMesa'}
+from .graphics import ADVICE, RenderError, backend
+
 # Drawn larger by this and reduced. Measured (docs/world.md): the rasteriser's own multisampling
 # costs twice as much for the same edges.
 SUPERSAMPLING = 1.5
-_ADVICE = (
-    'no OpenGL for rendering: install EGL with Mesa '
-    '(Debian, Ubuntu: apt install libegl1 libgl1-mesa-dri)'
-)
-
-
-class RenderError(RuntimeError):
-    """Nothing can be drawn on this machine; the message names what to install."""
 
 
 def _make_context(width: int, height: int) -> Any:
-    wanted = os.environ.get('MUJOCO_GL', '').lower()
-    if wanted and wanted not in _LIBRARIES:
-        raise RenderError(f"MUJOCO_GL={wanted}: the world renders with 'egl' or 'osmesa'")
-    for name in [wanted] if wanted else list(_LIBRARIES):
-        if ctypes.util.find_library(_LIBRARIES[name]):
-            try:
-                context = importlib.import_module(f'mujoco.{name}').GLContext(width, height)
-                context.make_current()
-                return context
-            except Exception as error:  # the bindings raise whatever the driver gives them
-                raise RenderError(f'{_ADVICE}; {name} said: {error}') from error
-    raise RenderError(_ADVICE)
+    name = backend()
+    try:
+        context = importlib.import_module(f'mujoco.{name}').GLContext(width, height)
+        context.make_current()
+    except Exception as error:  # the bindings raise whatever the driver gives them
+        raise RenderError(f'{ADVICE}; {name} said: {error}') from error
+    return context
 
 
 def buffer_size(image_size: tuple[int, int]) -> tuple[int, int]:
@@ -52,7 +34,10 @@ def buffer_size(image_size: tuple[int, int]) -> tuple[int, int]:
 
 
 class Renderer:
-    """Draws one camera of a compiled scene into an image (H, W, 3) uint8, RGB."""
+    """Draws one camera of a compiled scene into an image (H, W, 3) uint8, RGB.
+
+    OpenGL belongs to a thread: draw and close in the one that made the renderer.
+    """
 
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, camera: str, image_size: tuple[int, int]
@@ -75,7 +60,7 @@ class Renderer:
         self._camera.fixedcamid = model.camera(camera).id
         mujoco.mj_forward(model, data)
         if self.draw().std() < 1.0:
-            raise RenderError(f'{_ADVICE}; the driver that is there draws empty images')
+            raise RenderError(f'{ADVICE}; the driver that is there draws empty images')
 
     def draw(self) -> np.ndarray:
         """Draw the scene as it stands (kinematics must be current)."""
