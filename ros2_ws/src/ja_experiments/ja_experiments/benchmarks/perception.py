@@ -5,6 +5,11 @@ The pictures come from other projects' packages; what a person would name in the
 Rows are ``{'value', 'unit', 'n', 'interval'}`` with a 95 % interval.
 """
 
+import json
+import os
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from functools import cache
@@ -24,7 +29,7 @@ from ja_common.core.geometry import angle_between, directions_of_rays
 from ja_common.core.posture import Posture
 from ja_common.detection_codec import encode_detections
 from ja_common.image_codec import decode_image, encode_image
-from ja_experiments.package_pictures import package_file
+from ja_experiments.package_pictures import package_file, package_folder
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.detector import DetectorConfig, Percept, SalientFeatureDetector
@@ -40,6 +45,7 @@ Picture = NDArray[np.uint8]
 VIEW_RAD = np.radians(36)
 FRAME_NS = 33_333_333
 FEATURES = {'colour': (1.0, 0.0, 0.0), 'texture': (0.0, 1.0, 0.0), 'all': (1.0, 1.0, 1.0)}
+FACE_WIDTHS_PX = (30, 40, 60, 100, 200)
 SPEEDS_DEG_S = (10, 20, 40, 80)
 FINDERS = {
     'blazeface': BlazeFace,
@@ -51,7 +57,8 @@ FINDERS = {
 def run() -> dict[str, Row]:
     """All figures of perception."""
     cv2.setNumThreads(1)
-    return speed() | named_objects() | faces() | turning_head() | movers() | closed_loop()
+    parts = (speed, named_objects, cv2_saliency, faces, turning_head, movers, closed_loop)
+    return {name: row for part in parts for name, row in part().items()}
 
 
 def speed(images: int = 300) -> dict[str, Row]:
@@ -89,6 +96,30 @@ def named_objects() -> dict[str, Row]:
     return rows
 
 
+def cv2_saliency() -> dict[str, Row]:
+    """The same question to the saliency maps of opencv-contrib, in a process of its own."""
+    marked = [(p, marks['objects']) for p, marks in _pictures() if 'objects' in marks]
+    contrib = package_folder('opencv-contrib-python-headless>=4.14,<5')
+    with tempfile.TemporaryDirectory() as folder:
+        for number, (picture, _) in enumerate(marked):
+            cv2.imwrite(f'{folder}/{number:03}.png', cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+        script = files('ja_experiments.benchmarks') / '_cv2_saliency.py'
+        done = subprocess.run(
+            [sys.executable, str(script), folder],
+            env={**os.environ, 'PYTHONPATH': str(contrib)},
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+    rows = {}
+    for method, places in json.loads(done.stdout).items():
+        hits = []
+        for (u, v, _), (picture, boxes) in zip(places, marked, strict=True):
+            place = (u / picture.shape[1], v / picture.shape[0])
+            hits.append(any(_inside(place, box) for box in boxes))
+        rows[f'most salient is a named thing, cv2 {method}'] = _share(hits)
+        rows[f'time of cv2 {method}'] = _mean([1000 * seconds for *_, seconds in places], 'ms')
+    return rows
+
+
 def faces() -> dict[str, Row]:
     """Faces found and invented by each finder; frames with the right number of faces."""
     rows = {}
@@ -105,6 +136,8 @@ def faces() -> dict[str, Row]:
                 invented.append(bool(seen))
         rows[f'faces found, {name}'] = _share(found)
         rows[f'face-free pictures with a face, {name}'] = _share(invented)
+    for width_px in FACE_WIDTHS_PX:
+        rows[f'{width_px} px wide face found in 640x480'] = _share(_small_face_hits(width_px))
     for clip, marks in _marks()['clips'].items():
         detector = SalientFeatureDetector(BlazeFace())
         right = [
@@ -251,6 +284,28 @@ def _settled(picture: Picture, finder: FaceFinder, looks: int = 30) -> Percept:
     for number in range(looks):
         percept = detector.look(picture, number * FRAME_NS, camera, None)
     return percept
+
+
+def _small_face_hits(width_px: int, places: int = 12) -> list[bool]:
+    """The astronaut's head, scaled, at random places of a face-free street: is it found?"""
+    rng = np.random.default_rng(width_px)
+    astronaut = cv2.imread(
+        str(package_file('scikit-image', 'astronaut.png')), cv2.IMREAD_COLOR_RGB
+    )
+    head = astronaut[40:210, 140:310]
+    scale = width_px / 94  # the width of the astronaut's face
+    head = cv2.resize(head, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    street = cv2.imread(str(package_file('opencv-doc', 'building.jpg')), cv2.IMREAD_COLOR_RGB)
+    street = cv2.resize(street, (640, 480), interpolation=cv2.INTER_AREA)
+    hits = []
+    for _ in range(places):
+        left, top = rng.integers(0, (640 - head.shape[1], 480 - head.shape[0]))
+        picture = street.copy()
+        picture[top : top + head.shape[0], left : left + head.shape[1]] = head
+        u, v = left + head.shape[1] / 2, top + 0.55 * head.shape[0]
+        seen = [d for d in _settled(picture, BlazeFace()).detections if d.kind is Kind.FACE]
+        hits.append(any(np.hypot(d.u - u, d.v - v) < 0.5 * width_px for d in seen))
+    return hits
 
 
 def _clip_percepts(clip: str, detector: SalientFeatureDetector, most: int) -> Iterator[Percept]:

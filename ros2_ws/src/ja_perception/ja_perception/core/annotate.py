@@ -16,6 +16,8 @@ _WHITE: Colour = (255, 255, 255)
 _FACE: Colour = (255, 220, 60)
 # Colour, edge and motion, in the order of Eq. 1.
 _FEATURE_COLOURS: tuple[Colour, ...] = ((255, 80, 80), (80, 200, 255), (140, 255, 100))
+_BAR_GROUND: Colour = (60, 60, 60)
+_BAR_PX = 40
 _LEAST_WIDTH = 480
 _GOLDEN_RATIO = 0.618033988749895
 
@@ -61,8 +63,9 @@ def _feature_bars(
     features = (detection.f_col, detection.f_edg, detection.f_mot)
     for row, (value, colour) in enumerate(zip(features, _FEATURE_COLOURS, strict=True)):
         top = corner[1] + 4 * row
-        end = corner[0] + round(40 * value)
-        cv2.rectangle(canvas, (corner[0], top), (end, top + 2), colour, cv2.FILLED)
+        for length, shade in ((1.0, _BAR_GROUND), (value, colour)):
+            end = corner[0] + round(_BAR_PX * length)
+            cv2.rectangle(canvas, (corner[0], top), (end, top + 2), shade, cv2.FILLED)
 
 
 def _inset(canvas: NDArray[np.uint8], face_image: NDArray[np.uint8]) -> None:

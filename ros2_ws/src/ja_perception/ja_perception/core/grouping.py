@@ -27,7 +27,7 @@ class GroupingConfig:
     """Which regions are objects."""
 
     smallest_object_share: float = parameter(
-        0.0006, 'smallest area of an object (share of the image)', low=0.0, high=1.0
+        0.001, 'smallest area of an object (share of the image)', low=0.0, high=1.0
     )
     largest_object_share: float = parameter(
         0.5, 'a region larger than this share of the image is background', low=0.0, high=1.0
