@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import CancelledError, ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from functools import cached_property
+from threading import Event
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,9 +129,16 @@ def run_conditions(
     `progress` is told, from any thread, how many trials more have been run.
     """
     results: dict[str, dict[int, Run]] = {name: {} for name in configs}
+    stop = Event()
+
+    def tell(trials: int) -> None:
+        if stop.is_set():
+            raise CancelledError
+        progress(trials)
+
     with ThreadPoolExecutor(workers or os.cpu_count()) as threads:
         jobs = {
-            threads.submit(run_seed, config, plan, materials, seed, progress): (name, seed)
+            threads.submit(run_seed, config, plan, materials, seed, tell): (name, seed)
             for name, config in configs.items()
             for seed in plan.seeds
         }
@@ -139,7 +147,8 @@ def run_conditions(
                 name, seed = jobs[job]
                 results[name][seed] = job.result()
         except BaseException:
-            threads.shutdown(wait=False, cancel_futures=True)
+            stop.set()
+            threads.shutdown(wait=True, cancel_futures=True)
             raise
     return {
         name: Condition(config, plan, [results[name][seed] for seed in plan.seeds])

@@ -120,23 +120,33 @@ def pan_and_tilt(conditions: Mapping[str, Condition]) -> Figure:
     return figure
 
 
-def ablation_bars(ends: Mapping[str, tuple[float, float, float]], title: str) -> Figure:
-    """Success at the end of every variant, with intervals; the first is the one varied."""
-    figure = new_figure(7.5, 0.8 + 0.24 * len(ends))
+def ablation_bars(variants: Mapping[str, Condition], title: str) -> Figure:
+    """Success at the end for every variant; the first is the one that the others change."""
+    figure = new_figure(7.5, 1.1 + 0.24 * len(variants))
     axes = figure.add_subplot()
-    rows = np.arange(len(ends))
-    mean, low, high = np.array(list(ends.values())).T
-    axes.barh(rows, mean, color=[GREEN] + [SKY] * (len(ends) - 1), height=0.7)
-    axes.errorbar(
-        mean, rows, xerr=[mean - low, high - mean], fmt='none', ecolor='black', elinewidth=0.9,
-        capsize=2,
-    )  # fmt: skip
-    axes.axvline(mean[0], color=GREEN, linewidth=0.8, linestyle='--')
-    axes.set_yticks(rows, list(ends), fontsize=8)
-    axes.invert_yaxis()
-    axes.set(xlabel='online success in the last block (mean, 95 % interval over seeds)')
-    axes.set(xlim=(0, 1), title=title)
+    rows = np.arange(len(variants))
+    measures = (
+        ('online', [c.online(-1) for c in variants.values()]),
+        ('learner alone, pool', [c.alone('end', 'pool') for c in variants.values()]),
+        ('learner alone, fresh looks', [c.alone('end', 'fresh') for c in variants.values()]),
+    )
+    for (label, shares), colour, marker, shift in zip(
+        measures, (GREEN, BLUE, ORANGE), ('s', 'o', 'D'), (-0.22, 0.0, 0.22), strict=True
+    ):
+        found = [over_seeds(share) for share in shares]
+        mean = np.array([e.mean for e in found])
+        errors = [mean - [e.low for e in found], [e.high for e in found] - mean]
+        axes.errorbar(
+            mean, rows + shift, xerr=errors, fmt=marker, color=colour, markersize=3.5,
+            elinewidth=0.9, label=label,
+        )  # fmt: skip
+        axes.axvline(mean[0], color=colour, linewidth=0.7, linestyle='--', alpha=0.6)
+    axes.set_yticks(rows, list(variants), fontsize=8)
+    axes.set(xlim=(0, 1.02), ylim=(len(variants) - 0.5, -0.5))
+    axes.set_xlabel('success at the end (mean and 95 % interval over seeds)')
+    axes.set_title(title, fontsize=10)
     _clean(axes)
+    axes.legend(frameon=False, fontsize=8, loc='lower center', bbox_to_anchor=(0.4, 1.08), ncols=3)
     return figure
 
 

@@ -76,7 +76,7 @@ def load_looks(
     count: int = POOL + FRESH,
     folder: Path | None = None,
     say: Callable[[str], None] = print,
-    progress: Callable[[int], None] = lambda done: None,
+    progress: Callable[[int], None] = lambda more: None,
 ) -> Looks:
     """Looks at the caregiver that `seed` makes of a scene, from `folder` or newly rendered.
 
@@ -198,7 +198,7 @@ def _render(scene: str, seed: int, count: int, progress: Callable[[int], None]) 
                 faces.append(sight.percept.face_image)
                 postures.append(sight.posture.position)
                 directions.append(sight.truth.directions[sight.truth.attended])
-                progress(len(faces))
+                progress(1)
     finally:
         world.close()
     return Looks(np.array(faces), np.array(postures), np.array(directions))

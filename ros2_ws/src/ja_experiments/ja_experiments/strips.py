@@ -64,7 +64,7 @@ def watch(
     scene: str,
     seed: int,
     trials: int,
-    progress: Callable[[int], None] = lambda done: None,
+    progress: Callable[[int], None] = lambda more: None,
 ) -> list[Episode]:
     """So many trials of the learner alone with the caregiver of the looks of this seed."""
     config = config.with_settings({**LEARNER_ALONE, 'dwell_s': DWELL_S})
@@ -78,7 +78,7 @@ def watch(
             episode = _next_episode(task)
             if episode is not None:
                 episodes.append(episode)
-                progress(len(episodes))
+                progress(1)
         return episodes
     finally:
         world.close()
@@ -95,14 +95,13 @@ def _leave_out_the_pool(world: JointAttentionWorld) -> None:
 def _next_episode(task: RenderedTask) -> Episode | None:
     """The next trial; None if the caregiver looked elsewhere meanwhile (her trial changed)."""
     sight = task.advance()
-    while sight.step.decision.phase is not Phase.SHIFT:
+    while not _shifting(sight):
         sight = task.advance()
-    sights, shifts = [sight], 0
-    while sight.step.decision.phase is Phase.SHIFT:
-        sight = task.advance()
-        arrived = sight.step.decision.phase is not Phase.SHIFT
-        if arrived or sight.step.decision.shifts > shifts:
-            shifts = sight.step.decision.shifts
+    sights = [sight]
+    while _shifting(sight):
+        before, sight = sight, task.advance()
+        decided = sight.step.decision
+        if not _shifting(sight) or decided.shifts > before.step.decision.shifts:
             sights.append(sight)
     if sight.truth.trial != sights[0].truth.trial:
         return None
@@ -110,6 +109,10 @@ def _next_episode(task: RenderedTask) -> Episode | None:
         return Episode(sights, None)
     nearest = np.argmin(angle_between(sight.truth.directions, sight.step.fixation))
     return Episode(sights, bool(nearest == sight.truth.attended))
+
+
+def _shifting(sight: Sight) -> bool:
+    return sight.step.decision.phase is Phase.SHIFT
 
 
 def most_telling(episodes: list[Episode], rows: int) -> list[Episode]:

@@ -1,0 +1,34 @@
+"""A bar on the terminal for everything that takes time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as RichProgress
+
+
+class Progress:
+    """Bars one below the other; `advance(n)` may be called from any thread."""
+
+    def __init__(self, console: Console | None = None) -> None:
+        self._console = console or Console(stderr=True)
+
+    def say(self, line: str) -> None:
+        """One line above the bars."""
+        self._console.print(line)
+
+    @contextmanager
+    def bar(self, label: str, total: int) -> Iterator[Callable[[int], None]]:
+        """A bar while the block runs; gives what moves it on by so many of `total`."""
+        columns = (
+            TextColumn('{task.description}'),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(elapsed_when_finished=True),
+        )
+        with RichProgress(*columns, console=self._console) as bars:
+            task = bars.add_task(label, total=total)
+            yield lambda done: bars.advance(task, done)
