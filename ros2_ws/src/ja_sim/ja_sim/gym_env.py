@@ -17,9 +17,8 @@ import numpy as np
 
 from ja_common.core.fixation import WIDTH_SIXTH, nearest_to_centre
 from ja_common.core.geometry import rays_of_directions
-
-from .core.scene import load_scene
-from .core.world import JointAttentionWorld, Truth
+from ja_sim.core.scene import load_scene
+from ja_sim.core.world import JointAttentionWorld, Truth
 
 ENV_ID = 'JointAttention-v0'
 SHIFT_S = 0.1

@@ -1,6 +1,6 @@
 """Algorithms and records without ROS."""
 
-from .graphics import require_named_backend
+from ja_sim.core.graphics import require_named_backend
 
 # Before any module here imports MuJoCo.
 require_named_backend()

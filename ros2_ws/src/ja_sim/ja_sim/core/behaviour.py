@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .specs import CaregiverSpec
+from ja_sim.core.specs import CaregiverSpec
 
 ROBOT = -1  # what she attends to when it is no object
 # The robot has left her when it looks this many tolerances away: the same look counts once.

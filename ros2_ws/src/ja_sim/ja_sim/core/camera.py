@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from .specs import HeadSpec
+from ja_sim.core.specs import HeadSpec
 
 
 @dataclass(frozen=True)

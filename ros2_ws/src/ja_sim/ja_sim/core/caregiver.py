@@ -15,9 +15,8 @@ import numpy as np
 
 from ja_common.core.config import ConfigError
 from ja_common.core.geometry import head_rotation, vectors_of_directions
-
-from .gaze import GazePose
-from .specs import CaregiverSpec
+from ja_sim.core.gaze import GazePose
+from ja_sim.core.specs import CaregiverSpec
 
 SKIN_TONES = (
     (0.96, 0.80, 0.70),

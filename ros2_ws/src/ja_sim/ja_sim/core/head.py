@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from .specs import HeadSpec
+from ja_sim.core.specs import HeadSpec
 
 TIMESTEP_S = 0.001
 AXES = {'pan': (0, 0, 1), 'tilt': (0, 1, 0)}

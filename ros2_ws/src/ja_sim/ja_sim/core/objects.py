@@ -11,8 +11,7 @@ import numpy as np
 
 from ja_common.core.config import ConfigError
 from ja_common.core.geometry import vectors_of_directions
-
-from .specs import ObjectsSpec
+from ja_sim.core.specs import ObjectsSpec
 
 SHAPES = ('sphere', 'box', 'cylinder', 'ellipsoid', 'capsule')
 PATTERNS = ('plain', 'checker', 'dots', 'cross')

@@ -10,7 +10,7 @@ import cv2
 import mujoco
 import numpy as np
 
-from .graphics import ADVICE, RenderError, backend
+from ja_sim.core.graphics import ADVICE, RenderError, backend
 
 # Drawn larger by this and reduced. Measured (docs/world.md): the rasteriser's own multisampling
 # costs twice as much for the same edges.

@@ -16,8 +16,7 @@ from typing import Any, get_type_hints
 import yaml
 
 from ja_common.core.config import ConfigError, parameter
-
-from .specs import (
+from ja_sim.core.specs import (
     HEAD_PRESETS,
     CaregiverSpec,
     Checked,

@@ -20,16 +20,15 @@ from ja_common.core.geometry import (
     head_rotation,
     rays_of_directions,
 )
-
-from .behaviour import ROBOT, Blinking, CaregiverBehaviour
-from .camera import Intrinsics, Observation, expose
-from .caregiver import CaregiverBodies, draw_appearance
-from .gaze import GazePose, GazeShift
-from .head import JointSample, PanTiltHead
-from .light import Lighting
-from .objects import Arrangement, ObjectBodies, Thing
-from .render import Renderer, buffer_size
-from .scene import Scene
+from ja_sim.core.behaviour import ROBOT, Blinking, CaregiverBehaviour
+from ja_sim.core.camera import Intrinsics, Observation, expose
+from ja_sim.core.caregiver import CaregiverBodies, draw_appearance
+from ja_sim.core.gaze import GazePose, GazeShift
+from ja_sim.core.head import JointSample, PanTiltHead
+from ja_sim.core.light import Lighting
+from ja_sim.core.objects import Arrangement, ObjectBodies, Thing
+from ja_sim.core.render import Renderer, buffer_size
+from ja_sim.core.scene import Scene
 
 START_NS = 1_000_000_000  # a stamp of zero means 'no time' in ROS
 
