@@ -1,12 +1,13 @@
 """The detector as a node: one detections message an image, with the image's own header."""
 
+import cv2
 import numpy as np
 import pytest
 import rclpy
 from builtin_interfaces.msg import Time
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
-from sensor_msgs.msg import Image, JointState
+from sensor_msgs.msg import CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
 from ja_common.core.detection import Kind, caregiver_face
@@ -21,6 +22,7 @@ from ja_common.topics import (
     FACE_IMAGE,
     IMAGE,
     IMAGE_ANNOTATED,
+    IMAGE_COMPRESSED,
     JOINT_STATES,
     TARGET,
 )
@@ -49,7 +51,8 @@ class Rig:
             topic.name: self.node.create_publisher(topic.type, topic.name, topic.says)
             for topic in (IMAGE, CAMERA_INFO, JOINT_STATES)
         }
-        self.wait(lambda: all(p.get_subscription_count() for p in self.publishers.values()))
+        hears = [p for n, p in self.publishers.items() if n != IMAGE.name or not parameters]
+        self.wait(lambda: all(p.get_subscription_count() for p in hears))
 
     def listen(self, topic):
         def keep(message):
@@ -198,6 +201,33 @@ def test_annotated_image_only_for_a_subscriber(rig):
     (drawn,) = rig.all_of(IMAGE_ANNOTATED)
     assert to_ns(drawn.header.stamp) == 2 * PERIOD_NS
     assert np.unique(decode_image(drawn).reshape(-1, 3), axis=0).shape[0] > 50
+
+
+def test_compressed_images_by_parameter(ros_context):
+    rig = Rig(ros_context, compressed=True)
+    jpeg = cv2.imencode('.jpg', caregiver_and_ball()[..., ::-1])[1]
+    topic = IMAGE_COMPRESSED
+    publisher = rig.node.create_publisher(topic.type, topic.name, topic.says)
+    rig.wait(publisher.get_subscription_count)
+    rig.joints(PERIOD_NS)
+    info = encode_camera_info(Header(), 320, 240, FOCAL_PX)
+    rig.publishers[CAMERA_INFO.name].publish(info)
+    message = CompressedImage(format='jpeg', data=jpeg.tobytes())
+    message.header.stamp = to_time(PERIOD_NS)
+    publisher.publish(message)
+    face, ball = decode_detections(rig.answer())
+    assert face.attended
+    assert (ball.u, ball.v) == pytest.approx((280, 60), abs=1)
+    rig.close()
+
+
+def test_smaller_calibration_is_scaled_to_the_image(rig):
+    rig.joints(PERIOD_NS)
+    header = Header(stamp=to_time(PERIOD_NS))
+    rig.publishers[CAMERA_INFO.name].publish(encode_camera_info(header, 160, 120, FOCAL_PX / 2))
+    rig.publishers[IMAGE.name].publish(encode_image(caregiver_and_ball(), header.stamp, 'eye'))
+    _, ball = decode_detections(rig.answer())
+    assert ball.ray == pytest.approx((120.5 / FOCAL_PX, -59.5 / FOCAL_PX), abs=0.003)
 
 
 def test_bad_parameter_is_refused_and_changes_nothing(rig):
