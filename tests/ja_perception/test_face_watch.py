@@ -129,6 +129,15 @@ def test_new_face_needs_confidence_but_a_known_one_may_turn_away():
     assert len(world.look()) == 1
 
 
+def test_who_moved_while_out_of_view_is_searched_for_in_every_image():
+    person = Person()
+    world = World(person, scan_every=1000, hold_face_s=0.15)
+    world.look()
+    person.direction = np.array([0.2, 0.0])
+    found_after = next(k for k in range(1, 10) if any(f.missed_s == 0 for f in world.look()))
+    assert found_after == 2
+
+
 def test_unchanged_face_costs_no_look():
     world = World(Person(), scan_every=1000)
     world.look(changed=False)

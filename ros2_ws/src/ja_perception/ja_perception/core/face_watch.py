@@ -203,7 +203,7 @@ class FaceWatch:
                 caregiver.missed_s = 0.0
             else:
                 squares.append(look_at(box, whole))
-        if self._scan_is_due():
+        if self._scan_is_due(expected):
             places = scan_squares(width, height, self._smallest_square(width))
             self._scan_place = (self._scan_place + 1) % len(places)
             if places[self._scan_place] not in squares:
@@ -222,8 +222,13 @@ class FaceWatch:
         smallest_px = max(self._config.smallest_face_share * width, _LEAST_FACE_PX)
         return smallest_px / self._finder.smallest_share
 
-    def _scan_is_due(self) -> bool:
-        if self._caregiver is None or self._until_scan <= 0:
+    def _scan_is_due(self, expected: list[WatchedFace]) -> bool:
+        """Every so many images; in every image while the caregiver is unknown or not in place."""
+        caregiver = self._caregiver
+        lost = caregiver is None or (
+            caregiver in expected and caregiver.missed_s > self._config.hold_face_s
+        )
+        if lost or self._until_scan <= 0:
             self._until_scan = self._config.scan_every - 1
             return True
         self._until_scan -= 1
