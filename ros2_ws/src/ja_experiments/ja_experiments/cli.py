@@ -59,9 +59,11 @@ def sweep(
 ) -> None:
     """Run a grid of experiments over seeds and parameters; what is finished is kept."""
     from ja_experiments.progress import Progress
+    from ja_experiments.study import prepare_materials
     from ja_experiments.sweep import read_grid, run_sweep
 
-    grid = read_grid(config)
+    grid, progress = read_grid(config), Progress()
+    materials = prepare_materials(grid.scene, looks_seed=0, progress=progress)
     folder = output or Path('runs') / f'sweep-{config.stem}'
-    table = run_sweep(grid, folder, scheduler, workers, Progress())
+    table = run_sweep(grid, materials, folder, progress, scheduler, workers)
     typer.echo(f'The results: {table}')

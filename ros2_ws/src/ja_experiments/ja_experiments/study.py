@@ -61,7 +61,7 @@ def run_study(config: StudyConfig, progress: Progress) -> Study:
     torch.set_num_threads(1)
     seconds: dict[str, float] = {}
     with _timed(seconds, 'looks at the caregiver'):
-        materials = _materials(config, progress)
+        materials = prepare_materials(config.scene, config.looks_seed, progress)
     with _timed(seconds, 'compilation'):
         compile_kernel(materials)
     by_objects, episodes, ablations = {}, {}, {}
@@ -97,12 +97,11 @@ def read_ablations(path: Path | None = None) -> dict[str, dict[str, Any]]:
     return yaml.safe_load(text)
 
 
-def _materials(config: StudyConfig, progress: Progress) -> Materials:
+def prepare_materials(scene: str, looks_seed: int, progress: Progress) -> Materials:
+    """The looks at the caregiver of a scene, rendered if they are not kept, and its places."""
     with progress.bar('looks at the caregiver', POOL + FRESH) as advance:
-        looks = load_looks(
-            config.scene, config.looks_seed, POOL + FRESH, say=progress.say, progress=advance
-        )
-    return Materials.of(looks, load_scene(config.scene).objects)
+        looks = load_looks(scene, looks_seed, say=progress.say, progress=advance)
+    return Materials.of(looks, load_scene(scene).objects)
 
 
 def _figure_6(

@@ -1,0 +1,138 @@
+"""Sweeps: finished cells are kept, and no death of a process costs more than what it was at."""
+
+import multiprocessing
+import os
+import signal
+import time
+from pathlib import Path
+
+import pyarrow.parquet
+import pytest
+from distributed import LocalCluster
+
+from ja_common.core.config import ConfigError
+from ja_experiments.experiment import Materials
+from ja_experiments.looks import Looks
+from ja_experiments.progress import Progress
+from ja_experiments.sweep import Grid, read_grid, run_cell, run_sweep
+from ja_sim.core.specs import ObjectsSpec
+
+TRIALS = 30_000
+
+
+@pytest.fixture
+def materials(looks: Looks, places: ObjectsSpec) -> Materials:
+    return Materials(looks[:100], looks[100:], places)
+
+
+def grid_file(folder: Path, seeds: int) -> Path:
+    path = folder / 'sweep.yaml'
+    path.write_text(
+        f'reading: last\ntrials: {TRIALS}\nseeds: {seeds}\n'
+        'grid: {objects: [1, 5], learning_rate: 0.02}\n'
+    )
+    return path
+
+
+def cell_files(folder: Path) -> dict[Path, int]:
+    """Finished cells, and when each was written."""
+    return {path: path.stat().st_mtime_ns for path in folder.glob('cells/*.json')}
+
+
+def wait_for_cells(folder: Path, count: int) -> None:
+    deadline = time.monotonic() + 60
+    while len(cell_files(folder)) < count:
+        assert time.monotonic() < deadline, 'no cell was finished in time'
+        time.sleep(0.01)
+
+
+def sweep_in_child(grid: Grid, materials: Materials, folder: Path, address: str) -> None:
+    run_sweep(grid, materials, folder, Progress(), scheduler=address)
+
+
+def test_a_grid_is_every_combination_with_every_seed(tmp_path: Path) -> None:
+    cells = read_grid(grid_file(tmp_path, seeds=3)).cells
+    assert [(c.settings['objects'], c.seed) for c in cells] == [
+        (1, 0), (1, 1), (1, 2), (5, 0), (5, 1), (5, 2),
+    ]  # fmt: skip
+    assert {c.config().network.learning_rate for c in cells} == {0.02}
+    assert {c.config().network.pairs for c in cells} == {'last'}
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('grid: {learning_rte: [0.1]}', 'learning_rte is no parameter'),
+        ('grid: {objects: [1, many]}', "objects = 'many' is a str"),
+        ('gird: {}', 'and nothing else'),
+        ('reading: first', 'one of all, last'),
+        ('grid: {', 'cannot be read'),
+    ],
+)
+def test_a_wrong_grid_is_refused_in_one_sentence(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / 'sweep.yaml'
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=message) as refused:
+        read_grid(path)
+    assert str(path) in str(refused.value)
+
+
+@pytest.mark.slow
+def test_a_killed_worker_and_a_killed_sweep_lose_only_what_they_were_at(
+    tmp_path: Path, materials: Materials
+) -> None:
+    grid = read_grid(grid_file(tmp_path, seeds=4))
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        address = cluster.scheduler_address
+        child = multiprocessing.get_context('spawn').Process(
+            target=sweep_in_child, args=(grid, materials, tmp_path, address)
+        )
+        child.start()
+        wait_for_cells(tmp_path, 1)
+        assert child.pid is not None
+        os.kill(child.pid, signal.SIGKILL)
+        child.join()
+        kept = cell_files(tmp_path)
+        assert 0 < len(kept) < len(grid.cells)
+
+        again = multiprocessing.get_context('spawn').Process(
+            target=sweep_in_child, args=(grid, materials, tmp_path, address)
+        )
+        again.start()
+        wait_for_cells(tmp_path, len(kept) + 1)
+        os.kill(cluster.workers[0].pid, signal.SIGKILL)
+        again.join(timeout=120)
+        assert again.exitcode == 0
+
+    assert kept.items() <= cell_files(tmp_path).items(), 'finished cells were run again'
+    rows = pyarrow.parquet.read_table(tmp_path / 'results.parquet').to_pylist()
+    assert [(row['objects'], row['seed']) for row in rows] == [
+        (cell.settings['objects'], cell.seed) for cell in grid.cells
+    ]
+    assert rows[-1] == run_cell(grid.cells[-1], materials)
+
+
+def test_only_missing_cells_are_run_and_other_looks_are_other_cells(
+    tmp_path: Path, materials: Materials
+) -> None:
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        address = cluster.scheduler_address
+        small = read_grid(grid_file(tmp_path, seeds=1))
+        run_sweep(small, materials, tmp_path, Progress(), address)
+        written = cell_files(tmp_path)
+        assert len(written) == 2
+
+        larger = read_grid(grid_file(tmp_path, seeds=2))
+        table = run_sweep(larger, materials, tmp_path, Progress(), address)
+        assert written.items() <= cell_files(tmp_path).items()
+        assert pyarrow.parquet.read_table(table).num_rows == 4
+
+        other = Materials(materials.fresh, materials.pool, materials.places)
+        run_sweep(small, other, tmp_path, Progress(), address)
+        assert len(cell_files(tmp_path)) == 4 + 2
+    # All cells are there: nobody is asked for work.
+    run_sweep(larger, materials, tmp_path, Progress(), scheduler='tcp://nowhere.invalid:1')
