@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ja_experiments.config import READINGS, reading
-from ja_experiments.kernel import FastExperiment
+from ja_experiments.kernel import FastExperiment, prepare
 from ja_experiments.looks import Looks
 from ja_experiments.outcomes import Outcomes
 from ja_experiments.reference import ReferenceExperiment
@@ -63,7 +63,7 @@ def test_a_run_in_parts_is_the_same_run(looks: Looks, places: ObjectsSpec) -> No
 
     outcomes = whole.run(2000)
     assert_same_outcomes(outcomes[:700], parts.run(700))
-    parts.test(config, looks, trials=50, seed=9)  # learns nothing, and draws from its own stream
+    parts.test(config, prepare(looks, config), trials=50, seed=9)  # learns nothing, and draws from its own stream
     assert_same_outcomes(outcomes[700:], parts.run(1300))
     for name, array in whole.network.state().items():
         np.testing.assert_array_equal(parts.network.state()[name], array)
@@ -89,3 +89,13 @@ def test_learning_raises_success_well_above_chance(looks: Looks, places: Objects
     outcomes = FastExperiment(config, places, looks, seed=0).run(30_000)
     assert outcomes.success[-3000:].mean() > 0.6 > 0.3 > outcomes.success[:3000].mean()
     assert outcomes.success[-3000:][~outcomes.in_view[-3000:]].mean() > 0.5
+
+
+def test_answers_are_those_of_the_network(looks: Looks, places: ObjectsSpec) -> None:
+    config = reading('last').with_settings({'face_scaling': 'standardised'})
+    experiment = FastExperiment(config, places, looks, seed=0)
+    experiment.run(3000)
+    answers = experiment.answers(prepare(looks, config))
+    wanted = experiment.network.predict(looks.faces, looks.postures)
+    np.testing.assert_allclose(answers, wanted, atol=1e-5)
+    assert np.std(wanted) > 0.05

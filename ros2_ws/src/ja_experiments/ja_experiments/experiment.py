@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ja_experiments.config import ExperimentConfig
-from ja_experiments.kernel import FastExperiment
+from ja_experiments.kernel import FastExperiment, PreparedLooks, prepare
 from ja_experiments.looks import POOL, Looks
 from ja_experiments.outcomes import Outcomes
 from ja_learning.core.network import ThreeLayerNetwork
@@ -165,14 +165,21 @@ def run_seed(
 ) -> Run:
     """One robot's life: learn in blocks, look at what the network knows, test it at each stage."""
     experiment = FastExperiment(plan.of(config), materials.places, materials.pool, seed)
+    tested = {
+        'pool': prepare(materials.pool, config),
+        'fresh': prepare(materials.fresh, config),
+    }
+    # In the tests the caregiver is reliable: what is asked is what the network has learned.
+    test_config = config.with_settings({**LEARNER_ALONE, 'reliability': 1.0})
     online, alone, explained = [], {}, []
     for block in range(BLOCKS):
         online.append(experiment.run(plan.block))
-        explained.append(
-            [_explained(experiment.network, m) for m in (materials.pool, materials.fresh)]
-        )
+        explained.append([_explained(experiment, looks) for looks in tested.values()])
         for stage in _stages_after(block):
-            alone[stage] = _test_alone(experiment, config, plan, materials)
+            alone[stage] = {
+                name: experiment.test(test_config, looks, plan.test_trials, _TEST_SEED)
+                for name, looks in tested.items()
+            }
         progress(plan.block)
     return Run(_joined(online), alone, np.array(explained), experiment.network)
 
@@ -182,21 +189,10 @@ def _stages_after(block: int) -> list[str]:
     return [stage for stage, last in stages.items() if last == block]
 
 
-def _test_alone(
-    experiment: FastExperiment, config: ExperimentConfig, plan: Plan, materials: Materials
-) -> dict[str, Outcomes]:
-    # In the tests the caregiver is reliable: what is asked is what the network has learned.
-    config = config.with_settings({**LEARNER_ALONE, 'reliability': 1.0})
-    return {
-        name: experiment.test(config, looks, plan.test_trials, _TEST_SEED)
-        for name, looks in (('pool', materials.pool), ('fresh', materials.fresh))
-    }
-
-
-def _explained(network: ThreeLayerNetwork, looks: Looks) -> NDArray[np.float64]:
+def _explained(experiment: FastExperiment, looks: PreparedLooks) -> NDArray[np.float64]:
     """Share of the variance of the right commands that is explained, (2,): pan, tilt."""
-    right = looks.commands()
-    wrong = network.predict(looks.faces, looks.postures) - right
+    right = looks.directions - looks.postures
+    wrong = experiment.answers(looks) - right
     return 1 - (wrong**2).mean(axis=0) / right.var(axis=0)
 
 

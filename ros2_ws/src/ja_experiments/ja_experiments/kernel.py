@@ -66,7 +66,7 @@ class _Rules(NamedTuple):
     same_posture: float
 
 
-class _LookArrays(NamedTuple):
+class PreparedLooks(NamedTuple):
     """The looks as the kernel wants them; `vectors` are unit vectors to the face."""
 
     inputs: NDArray[np.float32]
@@ -96,7 +96,7 @@ class FastExperiment:
     ) -> None:
         self._places = places
         self._rules = _rules(config, places)
-        self._looks = _look_arrays(looks, config)
+        self._looks = prepare(looks, config)
         self._rng = np.random.default_rng(seed)
         self._network = ThreeLayerNetwork(config.network, seed)
         self._weights = _weights(self._network)
@@ -117,17 +117,22 @@ class FastExperiment:
         """The next so many trials."""
         return self._run(trials, self._rules, self._looks, self._rng, learning=True)
 
-    def test(self, config: ExperimentConfig, looks: Looks, trials: int, seed: int) -> Outcomes:
+    def test(
+        self, config: ExperimentConfig, looks: PreparedLooks, trials: int, seed: int
+    ) -> Outcomes:
         """So many trials in which nothing is learned, on any looks and under another config."""
-        rules = _rules(config, self._places)
         rng = np.random.default_rng(seed)
-        return self._run(trials, rules, _look_arrays(looks, config), rng, learning=False)
+        return self._run(trials, _rules(config, self._places), looks, rng, learning=False)
+
+    def answers(self, looks: PreparedLooks) -> NDArray[np.float64]:
+        """What the network proposes at every look, (n, 2) [rad]."""
+        return _answers(self._rules, self._weights, looks)
 
     def _run(
         self,
         trials: int,
         rules: _Rules,
-        looks: _LookArrays,
+        looks: PreparedLooks,
         rng: np.random.Generator,
         learning: bool,
     ) -> Outcomes:
@@ -190,8 +195,9 @@ def _rules(config: ExperimentConfig, places: ObjectsSpec) -> _Rules:
     )
 
 
-def _look_arrays(looks: Looks, config: ExperimentConfig) -> _LookArrays:
-    return _LookArrays(
+def prepare(looks: Looks, config: ExperimentConfig) -> PreparedLooks:
+    """Make looks ready for tests; worth doing once, since every pixel is scaled."""
+    return PreparedLooks(
         inputs=face_inputs(looks.faces, config.network.face_scaling).astype(np.float32),
         postures=looks.postures,
         directions=looks.directions,
@@ -223,7 +229,7 @@ def _run_trials(  # type: ignore[no-untyped-def]
         pan, tilt = looks.postures[look]
         face = looks.vectors[look]
         pixels = looks.inputs[look]
-        x, y = _ray(pan, tilt, vectors[ATTENDED])
+        x, y = _ray(_head(pan, tilt), vectors[ATTENDED])
         in_view[trial] = abs(x) < rules.view_x and abs(y) < rules.view_y
         _drive(weights.hidden, pixels, drive)
         postures[0, 0], postures[0, 1] = pan, tilt
@@ -316,9 +322,15 @@ def _dot(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True)
-def _ray(pan, tilt, vector):  # type: ignore[no-untyped-def]
-    """Ray (x, y) at which a vector is seen from a posture; NaN if behind."""
-    cp, sp, ct, st = math.cos(pan), math.sin(pan), math.cos(tilt), math.sin(tilt)
+def _head(pan, tilt):  # type: ignore[no-untyped-def]
+    """What `_ray` needs of a posture."""
+    return math.cos(pan), math.sin(pan), math.cos(tilt), math.sin(tilt)
+
+
+@njit(nogil=True)
+def _ray(head, vector):  # type: ignore[no-untyped-def]
+    """Ray (x, y) at which a vector is seen with the head in a posture; NaN if behind."""
+    cp, sp, ct, st = head
     level = cp * vector[0] + sp * vector[1]
     forward = ct * level - st * vector[2]
     if forward <= 1e-9:
@@ -331,11 +343,12 @@ def _ray(pan, tilt, vector):  # type: ignore[no-untyped-def]
 @njit(nogil=True)
 def _visual_feedback(rules, pan, tilt, vectors, scores):  # type: ignore[no-untyped-def]
     """Eq. 2 for the most salient object in view; no change when none is."""
+    head = _head(pan, tilt)
     best = 0.0
     pan_delta = tilt_delta = 0.0
     for index in range(rules.objects):
         if scores[index] > best:
-            x, y = _ray(pan, tilt, vectors[index])
+            x, y = _ray(head, vectors[index])
             if abs(x) < rules.view_x and abs(y) < rules.view_y:
                 best = scores[index]
                 pan_delta, tilt_delta = -rules.gain * x, rules.gain * y
@@ -345,18 +358,19 @@ def _visual_feedback(rules, pan, tilt, vectors, scores):  # type: ignore[no-unty
 @njit(nogil=True)
 def _fixated(rules, pan, tilt, face, vectors, scores):  # type: ignore[no-untyped-def]
     """Eq. 3: index of the object in the centre, or NOTHING (also when the face is nearer)."""
-    found, distance, best = NOTHING, math.inf, 0.0
+    head = _head(pan, tilt)
+    found, nearest, best = NOTHING, math.inf, 0.0  # distances are squared
     for index in range(rules.objects):
-        x, y = _ray(pan, tilt, vectors[index])
+        x, y = _ray(head, vectors[index])
         if scores[index] > 0 and abs(x) < rules.view_x and abs(y) < rules.view_y:
-            away = math.hypot(x, y)
-            if (rules.nearest and away < distance) or (not rules.nearest and scores[index] > best):
-                found, distance, best = index, away, scores[index]
-    if not distance < rules.d_th_ray:
+            away = x * x + y * y
+            if (rules.nearest and away < nearest) or (not rules.nearest and scores[index] > best):
+                found, nearest, best = index, away, scores[index]
+    if not nearest < rules.d_th_ray**2:
         return NOTHING
-    x, y = _ray(pan, tilt, face)
+    x, y = _ray(head, face)
     face_in_view = abs(x) < rules.view_x and abs(y) < rules.view_y
-    return NOTHING if face_in_view and math.hypot(x, y) < distance else found
+    return NOTHING if face_in_view and x * x + y * y < nearest else found
 
 
 @njit(nogil=True)
@@ -396,6 +410,17 @@ def _propose(rules, weights, drive, pan, tilt):  # type: ignore[no-untyped-def]
         pan_out += weights.output[0, unit] * hidden
         tilt_out += weights.output[1, unit] * hidden
     return pan_out * rules.angle_scale, tilt_out * rules.angle_scale
+
+
+@njit(nogil=True, cache=True)
+def _answers(rules, weights, looks):  # type: ignore[no-untyped-def]
+    answers = np.empty((len(looks.inputs), 2))
+    drive = np.empty(len(weights.hidden), np.float32)
+    for look in range(len(looks.inputs)):
+        _drive(weights.hidden, looks.inputs[look], drive)
+        pan, tilt = looks.postures[look]
+        answers[look] = _propose(rules, weights, drive, pan, tilt)
+    return answers
 
 
 @njit(nogil=True)

@@ -59,10 +59,6 @@ class Looks:
     def __getitem__(self, chosen: slice) -> Looks:
         return Looks(self.faces[chosen], self.postures[chosen], self.directions[chosen])
 
-    def commands(self) -> NDArray[np.float64]:
-        """From each look to what she attended to, (n, 2) [rad]."""
-        return self.directions - self.postures
-
 
 def cache_folder() -> Path:
     """Where looks are kept: $JA_CACHE, or joint-attention in the user's cache folder."""
