@@ -11,7 +11,8 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 from ja_common.core.config import parameter
-from ja_common.core.detection import caregiver_face
+from ja_common.core.detection import caregiver_face, objects
+from ja_common.core.geometry import directions_of_rays
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_common.core.stamp_join import StampJoin
 from ja_common.detection_codec import decode_detections
@@ -22,7 +23,9 @@ from ja_common.posture_listener import PostureListener
 from ja_common.time_codec import to_ns
 from ja_common.topics import DETECTIONS, FACE_IMAGE, FIXATION, LM_DELTA
 from ja_learning.core.checkpoint import load_checkpoint, save_checkpoint
-from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
+from ja_learning.core.gaze_line import GazeLineConfig
+from ja_learning.core.learner import Learner, LearnerChoice, make_learner
+from ja_learning.core.network import NetworkConfig
 from ja_learning.core.trial import TrialRecorder, checked_face
 
 
@@ -47,7 +50,9 @@ class LearningModuleNode(GraphNode):
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('learning_module', **node_kwargs)
         self._config = self.configure(LearningModuleConfig)
+        self._choice = self.configure(LearnerChoice)
         self._network_config = self.configure(NetworkConfig)
+        self._gaze_line_config = self.configure(GazeLineConfig)
         self._joints = JointCodec(self.configure(JointConfig))
         self._learning = self._config.learning_enabled_at_start
         self._learner = self._untaught()
@@ -63,35 +68,45 @@ class LearningModuleNode(GraphNode):
         self.offer(Trigger, 'reset_learning', self._on_reset)
         self.offer(SetBool, 'learning_enabled', self._on_learning_enabled)
 
-    def _untaught(self) -> ThreeLayerNetwork:
-        return ThreeLayerNetwork(self._network_config, self._config.seed)
+    def _untaught(self) -> Learner:
+        return make_learner(
+            self._choice, self._network_config, self._gaze_line_config, self._config.seed
+        )
 
     def _on_face_image(self, message: Image) -> None:
         face = checked_face(decode_image(message)[..., 0])
         self._when_attended(FACE_IMAGE.name, message.header, face)
 
     def _on_detections(self, message: PointCloud2) -> None:
-        face = caregiver_face(decode_detections(message))
+        detections = decode_detections(message)
+        face = caregiver_face(detections)
+        rays = np.array([seen.ray for seen in objects(detections)]).reshape(-1, 2)
         if face is not None and face.attended:
-            self._when_attended(DETECTIONS.name, message.header, None)
+            self._when_attended(DETECTIONS.name, message.header, rays)
         else:
-            propose = partial(self._propose, message.header, None)
+            propose = partial(self._propose, message.header, rays, None)
             self._postures.when_known(to_ns(message.header.stamp), propose)
 
     def _when_attended(self, key: str, header: Header, value: Any) -> None:
         both = self._attended.add(key, to_ns(header.stamp), value)
         if both is not None:
-            propose = partial(self._propose, header, both[FACE_IMAGE.name])
+            rays, face = both[DETECTIONS.name], both[FACE_IMAGE.name]
+            propose = partial(self._propose, header, rays, face)
             self._postures.when_known(to_ns(header.stamp), propose)
 
-    def _propose(self, header: Header, face: np.ndarray | None, posture: Posture) -> None:
+    def _propose(
+        self, header: Header, rays: np.ndarray, face: np.ndarray | None, posture: Posture
+    ) -> None:
+        trial, here = self._trial, posture.position
         if face is not None:
-            self._trial.look(face, posture.position)
+            trial.look(face, here)
         elif posture.is_still(self._config.still_below_rad_s):
-            self._trial.rest(posture.position)
+            trial.rest(here)
+        if posture.is_still(self._config.still_below_rad_s):
+            trial.see(directions_of_rays(here, rays))
         delta = None
-        if self._trial.face is not None:
-            delta = self._learner.predict(self._trial.face, posture.position)
+        if trial.face is not None:
+            delta = self._learner.propose(trial.face, trial.look_posture, here, trial.candidates)
         self._delta.publish(self._joints.encode(header, delta))
 
     def _on_fixation(self, message: JointState) -> None:

@@ -75,6 +75,12 @@ class ThreeLayerNetwork:
             output = self._forward(self._inputs(np.asarray(face), np.asarray(posture, float)))
         return output.numpy().astype(float) * self.config.angle_scale_rad
 
+    def propose(
+        self, face: ArrayLike, look: ArrayLike, posture: ArrayLike, candidates: ArrayLike
+    ) -> NDArray[np.float64]:
+        """The same as `predict`: the paper's learner does not ask what was seen, or from where."""
+        return self.predict(face, posture)
+
     def learn(self, trial: Trial) -> None:
         """Back-propagation on the pairs of one trial, one step a pair, in the order they came."""
         chosen = slice(-1, None) if self.config.pairs == 'last' else slice(None)

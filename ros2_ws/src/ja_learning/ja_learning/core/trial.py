@@ -4,13 +4,16 @@ Nobody announces a trial. It begins with a look at the caregiver and ends with t
 after it; a look without fixation before the next one leaves nothing to learn.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 FACE_SHAPE = (30, 25)
 """Rows and columns of the picture of the caregiver's face (Nagai et al. 2003, section 3.1)."""
+
+SAME_OBJECT_RAD = 0.05
+"""Objects seen nearer to each other than this from two postures are one and the same."""
 
 SAME_POSTURE_RAD = 0.02
 """Postures nearer than this in both joints are one and the same."""
@@ -33,11 +36,13 @@ class Trial:
 
     `face`: uint8 (30, 25). `postures`: (n, 2) [rad], where each shift began, the look at the
     caregiver first. `fixation`: (2,) [rad], direction of the object fixated at the end.
+    `candidates`: (m, 2) [rad], directions of all objects that were seen meanwhile.
     """
 
     face: NDArray[np.uint8]
     postures: NDArray[np.float64]
     fixation: NDArray[np.float64]
+    candidates: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
 
     def displacements(self) -> NDArray[np.float64]:
         """What remained to turn at each posture, shape (n, 2) [rad]: the target of learning."""
@@ -51,6 +56,7 @@ class TrialRecorder:
         self._same_within = same_within_rad
         self._face: NDArray[np.uint8] | None = None
         self._postures: list[NDArray[np.float64]] = []
+        self._candidates: list[NDArray[np.float64]] = []
 
     @property
     def face(self) -> NDArray[np.uint8] | None:
@@ -61,11 +67,33 @@ class TrialRecorder:
         """The head attends to the caregiver: a trial begins, or its look goes on."""
         self._face = checked_face(face)
         self._postures = [np.array(posture, float)]
+        self._candidates = []
 
     def rest(self, posture: ArrayLike) -> None:
         """The head stands still at a posture (2,) [rad]; repeated postures count once."""
         if self._face is not None and not self._same(posture, self._postures[-1]):
             self._postures.append(np.array(posture, float))
+
+    @property
+    def look_posture(self) -> NDArray[np.float64]:
+        """Posture (2,) [rad] from which the face was seen; IndexError between trials."""
+        return self._postures[0]
+
+    @property
+    def candidates(self) -> NDArray[np.float64]:
+        """Directions (m, 2) [rad] of the objects seen in the trial under way."""
+        return np.array(self._candidates).reshape(-1, 2)
+
+    def see(self, directions: ArrayLike) -> None:
+        """Objects stand in these directions (m, 2) [rad], seen while the head stands still."""
+        if self._face is None:
+            return
+        for direction in np.asarray(directions, float).reshape(-1, 2):
+            distances = [np.hypot(*(direction - known)) for known in self._candidates]
+            if not distances or min(distances) > SAME_OBJECT_RAD:
+                self._candidates.append(direction)
+            else:  # the newest sight counts: nearer to the centre, and things move
+                self._candidates[int(np.argmin(distances))] = direction
 
     def fixate(self, posture: ArrayLike, direction: ArrayLike) -> Trial | None:
         """An object in this direction is fixated from this posture: the trial, if one was open.
@@ -77,7 +105,7 @@ class TrialRecorder:
             began = began[:-1]  # where the last shift ended, none began
         if self._face is None or not began:
             return None
-        trial = Trial(self._face, np.array(began), np.array(direction, float))
+        trial = Trial(self._face, np.array(began), np.array(direction, float), self.candidates)
         self.forget()
         return trial
 
@@ -85,6 +113,7 @@ class TrialRecorder:
         """Drop the trial under way."""
         self._face = None
         self._postures = []
+        self._candidates = []
 
     def _same(self, a: ArrayLike, b: ArrayLike) -> bool:
         return bool(np.all(np.abs(np.subtract(a, b)) < self._same_within))
