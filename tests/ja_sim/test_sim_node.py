@@ -1,11 +1,12 @@
 """`sim`: a camera and a head on topics, one step for each command that answers the last image."""
 
 import math
+import time
 
 import numpy as np
 import pytest
 from rclpy.parameter import Parameter
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from ja_common.core.config import ConfigError
 from ja_common.image_codec import decode_image
@@ -155,6 +156,50 @@ def test_real_time_needs_no_command(make_rig):
         return rig.bench.heard(JOINT_STATES)[-1].position[0] == pytest.approx(0.1, abs=0.01)
 
     rig.bench.wait(arrived)
+
+
+def test_in_a_pause_time_stands_still_but_for_single_steps(make_rig):
+    rig = make_rig(resend_after_s=0.05)
+    assert not rig.bench.call(Trigger, 'sim/step').success, 'it runs'
+    assert rig.bench.call(SetBool, 'sim/pause', data=True).success
+    first = stamp(rig.image)
+    rig.command(0.0, 0.0)
+    rig.bench.wait(lambda: rig.bench.received(JOINT_COMMANDS) == 1)
+    assert stamp(rig.bench.next(IMAGE, count=2)) == first
+    assert rig.bench.call(Trigger, 'sim/step').success
+    rig.bench.wait(lambda: stamp(rig.image) == first + PERIOD_NS)
+    rig.command(0.0, 0.0)
+    rig.bench.wait(lambda: rig.bench.received(JOINT_COMMANDS) == 2)
+    assert rig.bench.call(SetBool, 'sim/pause', data=False).success
+    rig.bench.wait(lambda: stamp(rig.image) == first + 2 * PERIOD_NS)
+
+
+def test_a_set_speed_holds_the_lockstep_back(make_rig):
+    rig = make_rig()
+    assert rig.bench.set_parameter('real_time_factor', 0.5).successful
+    rig.step(0.0, 0.0)
+    start = time.monotonic()
+    for _ in range(3):
+        rig.step(0.0, 0.0)
+    assert time.monotonic() - start > 0.35, 'at least two whole periods of 0.2 s'
+    assert rig.bench.set_parameter('real_time_factor', 0.0).successful
+    assert not rig.bench.set_parameter('real_time_factor', -1.0).successful
+
+
+def test_objects_can_be_counted_anew_and_rearranged(make_rig):
+    rig = make_rig()
+    assert len(decode_truth(rig.at_image(SIM_TRUTH)).directions) == 3
+    first = stamp(rig.image)
+    assert rig.bench.set_parameter('objects', 5).successful
+    rig.bench.wait(lambda: stamp(rig.image) > first)
+    before = decode_truth(rig.at_image(SIM_TRUTH)).directions
+    assert before.shape == (5, 2)
+    assert rig.bench.call(Trigger, 'sim/rearrange').success
+    rig.step(0.0, 0.0)
+    after = decode_truth(rig.at_image(SIM_TRUTH)).directions
+    assert np.all(np.abs(after - before).max(axis=1) > 1e-3)
+    rig.bench.set_parameter('objects', 0)
+    rig.bench.wait(lambda: len(decode_truth(rig.at_image(SIM_TRUTH)).directions) == 3)
 
 
 def test_broken_command_is_one_clear_error_and_moves_nothing(make_rig):

@@ -2,17 +2,18 @@
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
+from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
-from ja_common.core.config import parameter
+from ja_common.core.config import ConfigError, parameter
 from ja_common.core.health import Level
 from ja_common.core.stamps import NS_PER_S
 from ja_common.graph_node import GraphNode, spin_node
@@ -27,6 +28,7 @@ from ja_common.topics import (
     JOINT_STATES,
     SIM_TRUTH,
 )
+from ja_sim.core.pace import Pace
 from ja_sim.core.scene import load_scene
 from ja_sim.core.world import JointAttentionWorld, Observation
 from ja_sim.truth_codec import encode_truth
@@ -36,7 +38,7 @@ CAMERA_FRAME = 'camera_optical_frame'
 
 @dataclass(frozen=True)
 class SimConfig:
-    """Which world, and how its time passes."""
+    """Which world, and by what its time passes."""
 
     scene: str = parameter('default', 'name of a scene, or path of a scene file (YAML)')
     seed: int = parameter(0, 'seed of everything that is drawn', low=0)
@@ -47,12 +49,22 @@ class SimConfig:
     lockstep: bool = parameter(
         True, 'step when the command for the last image has come (else: in real time)'
     )
-    real_time_factor: float = parameter(
-        1.0, 'simulated seconds a second when not in lockstep', low=0.01, high=100.0
-    )
     resend_after_s: float = parameter(
-        0.5, 'in lockstep: send the last image again when no command came for so long',
+        0.5, 'in lockstep or a pause: send the last image again after so long',
         low=0.05, high=60.0,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LiveConfig:
+    """What may change while the world runs."""
+
+    objects: int = parameter(
+        0, 'how many objects, in a world begun anew; 0: as many as the scene says', low=0, high=10
+    )
+    real_time_factor: float = parameter(
+        0.0, 'simulated seconds a second; 0: as fast as commands come in lockstep, else 1',
+        low=0.0, high=100.0,
     )  # fmt: skip
 
 
@@ -73,11 +85,9 @@ class SimNode(GraphNode):
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('sim', **node_kwargs)
         self._config = self.configure(SimConfig)
+        self._live = self.configure(LiveConfig, self._on_live_config)
         self._joints = JointCodec(self.configure(JointConfig))
-        size = (self._config.image_width, self._config.image_height)
-        self._world = JointAttentionWorld(
-            load_scene(self._config.scene), self._config.seed, image_size=size
-        )
+        self._world = self._make_world(self._live.objects)
         # The world's time starts at nought after a reset; the time of the graph never goes back.
         self._time_offset_ns = 0
         self.hear(JOINT_COMMANDS, self._on_command, expected_every_s=2.0)
@@ -87,15 +97,17 @@ class SimNode(GraphNode):
         self._camera_info = self.say(CAMERA_INFO)
         self._image = self.say(IMAGE)
         self.offer(Trigger, 'sim/reset', self._on_reset)
+        self.offer(SetBool, 'sim/pause', self._on_pause)
+        self.offer(Trigger, 'sim/step', self._on_step)
+        self.offer(Trigger, 'sim/rearrange', self._on_rearrange)
 
         self._round = self._advance()
         self._published_s = -math.inf
-        steady = RosClock(clock_type=ClockType.STEADY_TIME)
-        if self._config.lockstep:
-            self.create_timer(self._config.resend_after_s / 5, self._resend, clock=steady)
-        else:
-            period_s = 1 / (self._config.camera_rate_hz * self._config.real_time_factor)
-            self.create_timer(period_s, self._tick, clock=steady)
+        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
+        self._pace = Pace(self._config.lockstep)
+        self._beats: Timer | None = None
+        self._set_speed(self._live.real_time_factor)
+        self.create_timer(self._config.resend_after_s / 5, self._resend, clock=self._steady)
 
     def destroy_node(self) -> None:
         """Close the renderer, then the node."""
@@ -110,18 +122,29 @@ class SimNode(GraphNode):
         if posture is None:
             raise ValueError('a command names no joints')
         self._world.command(posture)
-        if self._config.lockstep:
+        self._pace.answer()
+        self._go_on()
+
+    def _on_beat(self) -> None:
+        self._pace.beat()
+        self._go_on()
+
+    def _go_on(self) -> None:
+        if self._pace.is_due:
             self._tick()
 
     def _tick(self) -> None:
         self._round = self._advance()
+        self._pace.made()
         self._publish()
 
     def _resend(self) -> None:
+        """In lockstep, as a message may be lost; while time stands still, so that nobody stops."""
         silent_s = time.monotonic() - self._published_s
-        if silent_s < self._config.resend_after_s:
+        stands = self._config.lockstep or self._pace.paused
+        if silent_s < self._config.resend_after_s or not stands:
             return
-        if math.isfinite(silent_s):
+        if math.isfinite(silent_s) and not self._pace.answered:
             text = 'no command came for the last image; sending it again'
             self.problem('lockstep', text, Level.WARN)
         self._publish()
@@ -158,12 +181,69 @@ class SimNode(GraphNode):
         return Header(stamp=to_time(stamp_ns + self._time_offset_ns), frame_id=frame_id)
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        step_ns = int(NS_PER_S / self._config.camera_rate_hz)
-        self._time_offset_ns = to_ns(self._round.clock.clock) + step_ns
         self._world.reset(self._config.seed)
-        self._tick()
+        self._begin_anew()
         response.success, response.message = True, f'the world of seed {self._config.seed} again'
         return response
+
+    def _begin_anew(self) -> None:
+        step_ns = int(NS_PER_S / self._config.camera_rate_hz)
+        self._time_offset_ns = to_ns(self._round.clock.clock) + step_ns
+        self._tick()
+
+    def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> Any:
+        self._pace.pause(request.data)
+        self.health.values['paused'] = str(request.data)
+        self._go_on()
+        response.success, response.message = True, 'paused' if request.data else 'going on'
+        return response
+
+    def _on_step(self, _: Trigger.Request, response: Trigger.Response) -> Any:
+        self._pace.step()
+        self._go_on()
+        response.success, response.message = True, 'one image'
+        return response
+
+    def _on_rearrange(self, _: Trigger.Request, response: Trigger.Response) -> Any:
+        self._world.rearrange()
+        response.success, response.message = True, 'the objects have other places'
+        return response
+
+    def _on_live_config(self, config: LiveConfig) -> None:
+        if config.real_time_factor != self._live.real_time_factor:
+            self._set_speed(config.real_time_factor)
+        if config.objects != self._live.objects:
+            self._set_objects(config.objects)
+        self._live = config
+
+    def _set_speed(self, real_time_factor: float) -> None:
+        if self._beats is not None:
+            self.destroy_timer(self._beats)
+            self._beats = None
+        factor = real_time_factor or (0.0 if self._config.lockstep else 1.0)
+        self._pace.has_beat = factor > 0.0
+        if factor:
+            period_s = 1 / (self._config.camera_rate_hz * factor)
+            self._beats = self.create_timer(period_s, self._on_beat, clock=self._steady)
+        self._go_on()
+
+    def _set_objects(self, count: int) -> None:
+        try:
+            world = self._make_world(count)
+        except ConfigError as error:
+            self.problem('objects', f'the world stays as it was: {error}')
+            return
+        self._world.close()
+        self._world = world
+        self._begin_anew()
+
+    def _make_world(self, objects: int) -> JointAttentionWorld:
+        scene = load_scene(self._config.scene)
+        if objects:
+            scene = replace(scene, objects=replace(scene.objects, count=objects))
+        self.health.values['objects'] = str(scene.objects.count)
+        size = (self._config.image_width, self._config.image_height)
+        return JointAttentionWorld(scene, self._config.seed, image_size=size)
 
 
 def _camera_info(header: Header, observation: Observation) -> CameraInfo:

@@ -130,6 +130,11 @@ class JointAttentionWorld:
         self._observation: Observation | None = None
         self._sample = self._head.read_encoders(self._now_ns, self._encoder_rng)
 
+    def rearrange(self) -> None:
+        """Move or replace the objects at once, as the scene says; she turns to where hers is."""
+        self._arrangement.rearrange()
+        self._turn_to_attended()
+
     def command(self, posture: np.ndarray) -> None:
         """Send the head to a posture (2,) [rad]; ``clamped`` then tells if it was out of limits.
 
