@@ -27,6 +27,15 @@ class OnDeathChoice(str, Enum):
     restart = 'restart'
 
 
+class LearnerChoice(str, Enum):
+    """Who learns in the demo."""
+
+    gaze_line = 'gaze_line'
+    paper = 'paper'
+
+
+PRACTICE_TRIALS = {'gaze_line': 300, 'paper': 1500}
+
 OnDeathOption = Annotated[OnDeathChoice, typer.Option(help='What to do when a node dies.')]
 OneProcess = Annotated[bool, typer.Option('--one-process', help='All nodes in one process.')]
 TimeOption = Annotated[float, typer.Option('--time', min=0.0, help='End after so many seconds.')]
@@ -35,7 +44,17 @@ TimeOption = Annotated[float, typer.Option('--time', min=0.0, help='End after so
 @app.command()
 def demo(
     context: typer.Context,
-    trials: Annotated[int, typer.Option(min=1, help='Practise for so many trials.')] = 1500,
+    learner: Annotated[
+        LearnerChoice, typer.Option(help="The fast learner, or the paper's network.")
+    ] = LearnerChoice.gaze_line,
+    trials: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help=f'Practise for so many trials; {PRACTICE_TRIALS["gaze_line"]} by default, '
+            f"{PRACTICE_TRIALS['paper']} with the paper's learner.",
+        ),
+    ] = None,
     time_s: Annotated[
         float, typer.Option('--time', min=0.0, help='Practise for so many seconds at most.')
     ] = 120.0,
@@ -52,8 +71,9 @@ def demo(
     from ja_bringup.course import standard_course
     from ja_bringup.demo import run_demo
 
-    graph = with_arguments(sim_graph(seed, {'scene': scene}), context.obj or [])
-    stages = standard_course(trials, time_s, exam_trials)
+    graph = sim_graph(seed, {'scene': scene}, learner.value)
+    stages = standard_course(trials or PRACTICE_TRIALS[learner.value], time_s, exam_trials)
+    graph = with_arguments(graph, context.obj or [])
     sys.exit(run_demo(graph, stages, one_process, on_death.value, context.obj or []))
 
 

@@ -90,13 +90,19 @@ def preset(path: Path, thing: str) -> dict[str, Any]:
     return parameters
 
 
-def sim_graph(seed: int = 0, sim_parameters: Mapping[str, Any] | None = None) -> list[NodeSpec]:
-    """The mind before the simulated head. The seed is everybody's, so that a run repeats."""
+def sim_graph(
+    seed: int = 0, sim_parameters: Mapping[str, Any] | None = None, learner: str = 'gaze_line'
+) -> list[NodeSpec]:
+    """The mind before the simulated head. The seed is everybody's, so that a run repeats.
+
+    `learner`: whose preset (`config/demo_<learner>.yaml`) says how the learner and the gate are
+    set: the fast one, or the paper's.
+    """
     sim = {'seed': seed, **(sim_parameters or {})}
-    return _configured(
-        CONFIG / 'demo.yaml',
-        [*_mind(seed), NodeSpec('ja_sim', 'scorer'), NodeSpec('ja_sim', 'sim', sim)],
-    )
+    graph = [*_mind(seed), NodeSpec('ja_sim', 'scorer'), NodeSpec('ja_sim', 'sim', sim)]
+    for name in (f'demo_{learner}.yaml', 'demo.yaml'):
+        graph = _configured(CONFIG / name, graph)
+    return graph
 
 
 def rig_graph(source: str | None = None, seed: int = 0) -> list[NodeSpec]:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from sensor_msgs.msg import Image, JointState, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
@@ -49,6 +50,8 @@ class LearningModuleNode(GraphNode):
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('learning_module', **node_kwargs)
+        # Tensors this small are slower on many threads, which the other nodes need besides.
+        torch.set_num_threads(1)
         self._config = self.configure(LearningModuleConfig)
         self._choice = self.configure(LearnerChoice)
         self._network_config = self.configure(NetworkConfig)
