@@ -237,16 +237,19 @@ class GazeLineLearner:
                 raise ValueError(f'{name} holds numbers that are not finite')
         try:
             networks = [_loaded(self._network, arrays, p) for p in ('network.', 'mean.')]
-            counts = arrays['candidate_counts']
-            split = np.split(arrays['candidates'], np.cumsum(counts)[:-1]) if len(counts) else []
+            counts, places = arrays['candidate_counts'], arrays['candidates']
             faces = list(torch.from_numpy(arrays['faces'].copy()))
-            random = torch.from_numpy(arrays['random'].copy())
-            self._random.set_state(random)
             steps, trials = int(arrays['steps']), int(arrays['trials'])
+            random = torch.Generator()
+            random.set_state(torch.from_numpy(arrays['random'].copy()))
         except (KeyError, RuntimeError, TypeError, IndexError) as error:
             raise ValueError(f'not the state of this learner: {error}') from None
-        if len(faces) != len(split):
-            raise ValueError(f'{len(faces)} faces for {len(split)} sets of candidates')
+        if len(faces) != len(counts) or counts.sum() != len(places):
+            raise ValueError(
+                f'{len(faces)} faces and {len(places)} candidates do not fit the counts {counts}'
+            )
+        split = np.split(places, np.cumsum(counts)[:-1]) if len(counts) else []
+        self._random = random
         self._network.load_state_dict(networks[0])
         self._mean.load_state_dict(networks[1])
         for name, p in self._network.named_parameters():

@@ -1,0 +1,153 @@
+"""The fast learner: its belief by numbers, and what it learns without being told."""
+
+import numpy as np
+import pytest
+import torch
+
+from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner, GazeLineNetwork
+from ja_learning.core.learner import LearnerChoice, make_learner
+from ja_learning.core.network import NetworkConfig
+from ja_learning.core.trial import Trial
+
+LOOK = np.array([0.1, -0.05])
+
+
+def drawn_face(gaze: np.ndarray) -> np.ndarray:
+    """A grey face whose dark spot moves with the gaze (pan to the left, tilt down) [rad]."""
+    rows, columns = np.mgrid[0:30, 0:25]
+    column, row = 12 - 10 * gaze[0] / 0.7, 15 + 12 * gaze[1] / 0.3
+    spot = np.exp(-((rows - row) ** 2 + (columns - column) ** 2) / 8)
+    return (200 - 150 * spot).astype(np.uint8)
+
+
+def lived_trial(rng: np.random.Generator, objects: int = 4) -> tuple[Trial, int]:
+    """A trial among `objects`, one of which was meant; another may have been fixated."""
+    places = rng.uniform([-0.6, -0.25], [0.6, 0.25], (objects, 2))
+    meant, fixated = rng.integers(objects, size=2)
+    return (
+        Trial(drawn_face(places[meant]), LOOK[None], LOOK + places[fixated], LOOK + places),
+        int(meant),
+    )
+
+
+def share_right(learner: GazeLineLearner, rng: np.random.Generator, trials: int = 100) -> float:
+    right = 0
+    for _ in range(trials):
+        trial, meant = lived_trial(rng)
+        delta = learner.propose(trial.face, LOOK, LOOK, trial.candidates)
+        nearest = np.argmin(np.linalg.norm(trial.candidates - LOOK - delta, axis=1))
+        right += nearest == meant
+    return right / trials
+
+
+@pytest.fixture
+def learner() -> GazeLineLearner:
+    return GazeLineLearner(GazeLineConfig(channels=4), seed=3)
+
+
+def test_a_mirrored_face_gives_mirrored_pan_and_equal_tilt():
+    network = GazeLineNetwork(channels=4)
+    faces = torch.randn(5, 1, 30, 25)
+    with torch.no_grad():
+        gaze, mirrored = network.gaze(faces), network.gaze(faces.flip(-1))
+    assert torch.allclose(mirrored, gaze * torch.tensor([-1.0, 1.0]), atol=1e-6)
+
+
+def test_the_belief_is_a_density():
+    network = GazeLineNetwork(channels=4)
+    grid = torch.linspace(-4, 4, 401)
+    places = torch.stack(torch.meshgrid(grid, grid, indexing='ij'), -1).reshape(1, -1, 2)
+    with torch.no_grad():
+        density = network.log_density(torch.tensor([[0.6, -0.3]]), places).exp()
+    assert float(density.sum()) * 0.02**2 == pytest.approx(1.0, abs=1e-3)
+
+
+def test_depth_is_uncertain_along_the_line_of_gaze_and_not_across():
+    network = GazeLineNetwork(channels=4)
+    gaze = torch.tensor([[0.5, 0.2]])
+    along = gaze[:, None] * torch.tensor([0.5, 1.0, 1.8])[:, None]
+    across = gaze[:, None] + torch.tensor([[[-0.25, 0.6]]])
+    with torch.no_grad():
+        assert network.log_density(gaze, along).min() > network.log_density(gaze, across).max() + 5
+
+
+def test_it_learns_which_object_was_meant_though_nobody_tells(learner):
+    rng = np.random.default_rng(0)
+    before = share_right(learner, rng)
+    for _ in range(150):
+        learner.learn(lived_trial(rng)[0])
+    assert before < 0.5
+    assert share_right(learner, rng) > 0.85
+
+
+def test_what_was_fixated_changes_nothing():
+    """Neither right nor wrong reaches it: all that was seen counts alike."""
+    learners = [GazeLineLearner(GazeLineConfig(channels=4), seed=1) for _ in range(2)]
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        trial, meant = lived_trial(rng)
+        for learner, fixated in zip(learners, (meant, (meant + 1) % 4), strict=True):
+            fixation = trial.candidates[fixated]
+            learner.learn(Trial(trial.face, trial.postures, fixation, trial.candidates))
+    one, other = (learner.state() for learner in learners)
+    assert all(np.array_equal(one[name], other[name]) for name in one)
+
+
+def test_a_plausible_object_is_proposed_exactly_else_the_best_guess(learner):
+    face = drawn_face(np.zeros(2))
+    guess = learner.propose(face, LOOK, LOOK, np.empty((0, 2)))
+    near, far = LOOK + guess + 0.01, LOOK + guess + 2.0
+    here = LOOK + 0.2
+    assert learner.propose(face, LOOK, here, [near, far]) == pytest.approx(near - here)
+    assert learner.propose(face, LOOK, here, [far]) == pytest.approx(LOOK + guess - here)
+
+
+def test_a_trial_in_which_nothing_was_seen_teaches_nothing(learner):
+    before = learner.state()
+    learner.learn(Trial(drawn_face(np.zeros(2)), LOOK[None], LOOK))
+    after = learner.state()
+    assert learner.trials == 1
+    assert all(np.array_equal(before[k], after[k]) for k in before if k != 'trials')
+
+
+def test_a_restored_learner_goes_on_bit_for_bit(learner):
+    rng = np.random.default_rng(2)
+    for _ in range(6):
+        learner.learn(lived_trial(rng)[0])
+    again = GazeLineLearner(GazeLineConfig(channels=4), seed=99)
+    again.restore(learner.state())
+    for _ in range(3):
+        trial, _ = lived_trial(rng)
+        learner.learn(trial)
+        again.learn(trial)
+    one, other = learner.state(), again.state()
+    assert one.keys() == other.keys()
+    assert all(np.array_equal(one[name], other[name]) for name in one)
+
+
+@pytest.mark.parametrize(
+    ('spoil', 'why'),
+    [
+        (lambda s: s.pop('faces'), 'faces'),
+        (lambda s: s.update({'network.coder.0.weight': np.zeros((1, 1))}), 'must have shape'),
+        (lambda s: s.update({'mean.stretch_logits': np.full(9, np.nan)}), 'not finite'),
+        (lambda s: s.update({'candidate_counts': np.array([7])}), 'do not fit'),
+    ],
+)
+def test_another_learners_state_is_refused_and_changes_nothing(learner, spoil, why):
+    rng = np.random.default_rng(4)
+    learner.learn(lived_trial(rng)[0])
+    before, spoilt = learner.state(), learner.state()
+    spoil(spoilt)
+    with pytest.raises(ValueError, match=why):
+        learner.restore(spoilt)
+    after = learner.state()
+    assert all(np.array_equal(before[name], after[name]) for name in before)
+
+
+@pytest.mark.parametrize('kind', ['paper', 'gaze_line'])
+def test_learners_are_chosen_by_name(kind):
+    made = make_learner(LearnerChoice(kind), NetworkConfig(), GazeLineConfig(), seed=0)
+    assert made.kind == kind
+    face = drawn_face(np.zeros(2))
+    assert made.propose(face, LOOK, LOOK, np.empty((0, 2))).shape == (2,)
