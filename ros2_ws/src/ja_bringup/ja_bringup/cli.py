@@ -10,6 +10,7 @@ import typer
 from ja_bringup.graph import rig_graph, sim_graph, split_ros_arguments, with_arguments
 from ja_common.core.config import ConfigError
 from ja_common.ros_defaults import apply_ros_defaults
+from ja_experiments.cli import register as register_experiments
 
 app = typer.Typer(
     help='A camera head that learns joint attention, on ROS 2. ROS arguments go behind '
@@ -118,6 +119,20 @@ def bench(
     from ja_bringup.bench import run_benchmarks
 
     sys.exit(run_benchmarks(name, json_file))
+
+
+@app.command()
+def reference(
+    folder: Annotated[Path, typer.Option(help='Where the pages go.')] = Path('docs'),
+) -> None:
+    """Write topics.md and parameters.md from the running code."""
+    from ja_bringup.reference import write_reference
+
+    for page in write_reference(folder):
+        typer.echo(page)
+
+
+register_experiments(app)
 
 
 def main() -> None:
