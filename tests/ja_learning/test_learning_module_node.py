@@ -231,3 +231,17 @@ def test_broken_fixation_is_one_clear_error_and_the_node_lives_on(life):
     life.bench.say(FIXATION, joint_state(life.ms * MS, float('nan'), 0.0))
     life.bench.wait_for_complaint('/fixation: position of')
     life.trial()
+
+
+def test_another_learner_may_be_chosen_while_the_node_runs(make_bench):
+    bench = make_bench(LearningModuleNode, says=SAYS, hears=[LM_DELTA])
+    life = Life(bench)
+    life.trial()
+    assert bench.set_parameter('learner', 'gaze_line').successful
+    red = Detection(Kind.OBJECT, -0.2, 0.1, 0, 0, 10, 10, 1.0)
+    life.look()
+    delta = life.rest(0.0, [red])
+    assert delta.name
+    refused = bench.set_parameter('learner', 'teacher')
+    assert not refused.successful
+    assert "'teacher' is not one of paper, gaze_line" in refused.reason

@@ -53,7 +53,7 @@ class LearningModuleNode(GraphNode):
         # Tensors this small are slower on many threads, which the other nodes need besides.
         torch.set_num_threads(1)
         self._config = self.configure(LearningModuleConfig)
-        self._choice = self.configure(LearnerChoice)
+        self._choice = self.configure(LearnerChoice, self._choose)
         self._network_config = self.configure(NetworkConfig)
         self._gaze_line_config = self.configure(GazeLineConfig)
         self._joints = JointCodec(self.configure(JointConfig))
@@ -75,6 +75,12 @@ class LearningModuleNode(GraphNode):
         return make_learner(
             self._choice, self._network_config, self._gaze_line_config, self._config.seed
         )
+
+    def _choose(self, choice: LearnerChoice) -> None:
+        if choice != self._choice:
+            self._choice = choice
+            self._learner = self._untaught()
+            self._trial.forget()
 
     def _on_face_image(self, message: Image) -> None:
         face = checked_face(decode_image(message)[..., 0])

@@ -47,7 +47,7 @@ class LearnerChoice:
 
     learner: str = parameter(
         ThreeLayerNetwork.kind,
-        "the paper's 752-7-2 network, or the fast learner of lines of gaze",
+        "the paper's network, or the fast one of lines of gaze; a change starts untaught",
         choices=(ThreeLayerNetwork.kind, GazeLineLearner.kind),
     )
 
