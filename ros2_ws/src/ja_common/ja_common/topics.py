@@ -8,6 +8,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PointStamped
+from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState, PointCloud2
@@ -76,6 +77,12 @@ FACE_DELTA = Topic(
 LM_DELTA = Topic(
     'learning_module/delta', JointState, 'change of posture that the learner proposes', **_LINK
 )
+BELIEF = Topic(
+    'learning_module/belief',
+    PointCloud2,
+    'samples of where the learner believes she looks: pan, tilt, weight; while somebody looks',
+    **_LINK,
+)
 FIXATION = Topic(
     'fixation',
     JointState,
@@ -89,6 +96,7 @@ GATE_STATUS = Topic(
     'gate/status', DiagnosticStatus, 'phase, source, p(LM), limits, reason of a hold', **_LINK
 )
 DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, 'health of every node, 1 Hz', **_LINK)
+LOG = Topic('/rosout', Log, 'what every node logs', says=_qos(True, 1000), hears=_qos(True, 1000))
 CLOCK = Topic('/clock', Clock, 'simulated time', says=_qos(True, 10), hears=_qos(False, 1))
 SIM_TRUTH = Topic('sim/truth', PointCloud2, 'where everything is and what she attends to', **_LINK)
 SUCCESS_RATE = Topic(
