@@ -64,3 +64,13 @@ def test_broken_velocity_is_refused(velocity):
     message = JointState(name=['pan', 'tilt'], position=[0.0, 0.0], velocity=velocity)
     with pytest.raises(ValueError, match='velocity'):
         PLAIN.decode_velocity(message)
+
+
+def test_offset_is_of_postures_and_not_of_changes():
+    codec = JointCodec(JointConfig(pan_inverted=True, pan_offset_rad=0.5, tilt_offset_rad=-0.1))
+    message = codec.encode_posture(Header(), (0.1, 0.2), velocity=(1.0, 2.0))
+    assert list(message.position) == pytest.approx([0.4, 0.1])
+    assert list(message.velocity) == pytest.approx([-1.0, 2.0])
+    assert codec.decode_posture(message) == pytest.approx((0.1, 0.2))
+    assert codec.decode_posture(JointState()) is None
+    assert list(codec.encode(Header(), (0.1, 0.2)).position) == pytest.approx([-0.1, 0.2])

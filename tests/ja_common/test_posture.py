@@ -135,3 +135,15 @@ def test_items_behind_one_whose_handling_fails_still_wait():
     join.add(110 * MS, 'next')
     next(iter(join.ready()))  # its handler raised: nobody asks this iterator again
     assert given_now(join) == [('next', 110)]
+
+
+def test_gap_of_more_than_half_a_second_is_not_bridged():
+    kept = history((100, 0.0), (700, 0.6))
+    assert kept.at(400 * MS) is None
+    assert kept.at(700 * MS).position[0] == pytest.approx(0.6)
+
+
+def test_clock_set_back_by_less_than_the_horizon_leaves_no_sample_of_the_old_time():
+    kept = history((10_000, 0.5), (11_000, 0.6), (10_500, 0.1), (10_600, 0.2))
+    assert kept.newest.stamp_ns == 10_600 * MS
+    assert kept.at(10_550 * MS).position[0] == pytest.approx(0.15)

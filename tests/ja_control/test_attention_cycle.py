@@ -210,6 +210,25 @@ def test_shift_that_cannot_arrive_is_judged_after_the_settle_timeout():
     assert decision.target == pytest.approx((0.6, 0.0)), 'the next shift starts where it stands'
 
 
+def test_shift_aimed_outside_the_limits_has_arrived_where_they_end():
+    world = AngleWorld(objects=[])
+    world.learner = lambda posture: np.array([0.5, 0.0])
+    config = replace(CONFIG, settle_timeout_s=30.0)
+    gating = Gating(GatingConfig(gating='constant', p_lm_max=1.0))
+    wall = np.array([0.3, 0.2])
+
+    def reachable(target):
+        return np.clip(target, -wall, wall)
+
+    cycle = AttentionCycle(config, gating, np.random.default_rng(0), reachable)
+    shifts = []
+    for _ in range(12):
+        decision = cycle.step(world.percept())
+        world.obey(reachable(decision.target))
+        shifts.append(decision.shifts)
+    assert max(shifts) >= 2
+
+
 def test_lost_face_is_searched_and_found():
     world = AngleWorld(objects=[], face=(0.55, 0.0))
     rounds = run(make_cycle(search_after_s=1.0, search_period_s=8.0), world, 60)

@@ -1,9 +1,12 @@
 """`gate`: one command for every complete set of proposals; everything else holds the head."""
 
 import math
+import time
 
+import numpy as np
 import pytest
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from ja_common.core.health import Level
@@ -12,10 +15,13 @@ from ja_common.topics import (
     CLOCK,
     FACE_DELTA,
     FIXATION,
+    FORWARD_COMMANDS,
     GATE_STATUS,
     JOINT_COMMANDS,
     JOINT_STATES,
+    JOINT_TRAJECTORY,
     LM_DELTA,
+    ROBOT_DESCRIPTION,
     VF_DELTA,
 )
 from ja_control.gate_node import GateNode
@@ -23,6 +29,7 @@ from node_bench import header, joint_state
 
 PERIOD_NS = 100_000_000
 PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, FIXATION)
+SAYS = (*PROPOSALS, JOINT_STATES, CLOCK)
 FACE_RIGHT = {FACE_DELTA: (-0.5, 0.0)}
 SPEED = 2.0  # the gate's default [rad/s]
 
@@ -78,19 +85,15 @@ class Graph:
         status = heard(GATE_STATUS)[-1]
         return status, {value.key: value.value for value in status.values}
 
-    def hold(self):
-        """Say nothing until the watchdog holds the head."""
-        self.bench.wait(lambda: 'hold' in self.status()[0].message)
-        return self.bench.heard(JOINT_COMMANDS)[-1]
-
 
 @pytest.fixture
 def make_graph(make_bench):
     def make(**parameters):
-        # By default silence is no matter of these tests: a slow machine must not hold the head.
-        parameters = {'use_sim_time': True, 'stale_after_s': 30.0, **parameters}
-        says, hears = [*PROPOSALS, JOINT_STATES, CLOCK], [JOINT_COMMANDS, GATE_STATUS]
-        return Graph(make_bench(GateNode, says, hears, **parameters))
+        # An acceleration that reaches full speed in one period: plain numbers to compare with.
+        plain = {'lockstep': True, 'max_acceleration_rad_s2': 1e4, 'dead_zone_rad': 0.0}
+        parameters = {'use_sim_time': True, **plain, **parameters}
+        hears = [JOINT_COMMANDS, GATE_STATUS]
+        return Graph(make_bench(GateNode, SAYS, hears, **parameters))
 
     return make
 
@@ -170,73 +173,19 @@ def test_clock_set_back_starts_again_from_where_the_head_stands(graph):
     graph.stamp_ns = 500 * 10**9
     for _ in range(3):
         graph.image()
-    graph.stamp_ns, graph.pan = 5 * 10**9, 0.3
+    stopped = graph.pan
+    graph.stamp_ns = 5 * 10**9
+    assert graph.image(follow=False).position[0] == pytest.approx(stopped), 'it brakes'
+    graph.pan = 0.3
     assert graph.image().position[0] == pytest.approx(0.3)
     assert graph.image().position[0] == pytest.approx(0.3 - SPEED * PERIOD_NS / 1e9)
 
 
 def test_clock_set_forward_is_no_leap_of_the_head(make_graph):
-    graph = make_graph(stale_after_s=3.0, max_speed_rad_s=0.1)
+    graph = make_graph(max_speed_rad_s=0.1)
     graph.image()
     graph.stamp_ns += 1000 * 10**9
-    assert graph.image().position[0] == pytest.approx(-0.3)
-
-
-def test_silence_holds_the_head_where_it_stands_now(make_graph):
-    graph = make_graph(stale_after_s=0.4)
-    graph.image()
-    graph.image(follow=False)
-    graph.bench.say_posture(graph.stamp_ns + PERIOD_NS // 2, -0.05)
-    graph.tell(FACE_RIGHT, stamp_ns=graph.stamp_ns + PERIOD_NS, without=[LM_DELTA, VF_DELTA])
-    held = graph.hold()
-    assert list(held.position) == pytest.approx([-0.05, 0.0])
-    status, values = graph.status()
-    assert status.level == bytes([Level.WARN])
-    assert 'no learning_module/delta, visual_feedback/delta for' in values['reason']
-    assert 'holding the head where it is' in graph.bench.complaint()
-
-
-def test_missing_joint_states_are_named(make_graph):
-    graph = make_graph(stale_after_s=0.4)
-    graph.image()
-    graph.tell(FACE_RIGHT, stamp_ns=graph.stamp_ns + PERIOD_NS)
-    graph.hold()
-    assert graph.status()[1]['reason'].startswith('no joint_states for')
-
-
-def test_after_a_hold_the_head_starts_from_its_measured_posture(make_graph):
-    graph = make_graph(stale_after_s=0.4, dwell_s=0.0)
-    for _ in range(2):
-        graph.image({FACE_DELTA: (0.0, 0.0), VF_DELTA: (0.3, 0.0)})
-    assert graph.status()[0].message == 'shift'
-    graph.hold()
-    graph.pan = 0.4  # somebody turned it
-    assert graph.image().position[0] == pytest.approx(0.4)
-    assert graph.status()[0].message == 'look', 'the shift that was under way is given up'
-
-
-def test_image_repeated_after_a_hold_is_answered_under_its_own_stamp(make_graph):
-    """In lockstep the sim waits for exactly this answer."""
-    graph = make_graph(stale_after_s=0.4)
-    graph.image(age_s=0.01)
-    graph.image(age_s=0.01)
-    assert to_ns(graph.hold().header.stamp) != graph.stamp_ns
-    graph.tell(FACE_RIGHT)
-    assert to_ns(graph.bench.next(JOINT_COMMANDS).header.stamp) == graph.stamp_ns
-
-
-def test_old_image_holds_where_the_head_stands_now(make_graph):
-    graph = make_graph(stale_after_s=0.5)
-    graph.image()
-    graph.stamp_ns += PERIOD_NS
-    graph.set_clock(graph.stamp_ns + 10**9)
-    graph.bench.say_posture(graph.stamp_ns, 0.1)
-    graph.bench.say_posture(graph.stamp_ns + 10**9, 0.3)
-    graph.bench.wait(lambda: graph.bench.received(JOINT_STATES) == 3)
-    graph.tell(FACE_RIGHT)
-    command = graph.bench.next(JOINT_COMMANDS)
-    assert list(command.position) == pytest.approx([0.3, 0.0]), 'never moves on old data'
-    assert graph.status()[1]['reason'] == 'the newest image is 1.0 s old'
+    assert graph.image().position[0] == pytest.approx(-0.2), 'of two seconds at most'
 
 
 def test_disabled_gate_holds_and_starts_from_where_the_head_stands(graph):
@@ -283,7 +232,7 @@ def test_home_is_refused_while_disabled(make_graph):
 def test_command_stays_inside_the_position_limits(make_graph):
     graph = make_graph(pan_min_rad=-0.3)
     commands = [graph.image({FACE_DELTA: (-2.0, 0.0)}).position[0] for _ in range(5)]
-    assert min(commands) == pytest.approx(-0.3)
+    assert min(commands) == pytest.approx(-0.28), 'by the soft margin'
     assert graph.status()[1]['clamped'] == 'position'
 
 
@@ -330,3 +279,166 @@ def test_parameters_of_the_running_gate(graph):
     assert set_parameter('gating', 'constant').successful
     graph.image()
     assert graph.status()[1]['p_lm'] == '1.0000'
+
+
+def test_not_finite_proposals_of_every_kind_move_nothing(graph):
+    """The whole set comes, but one number in it is none: no answer, a complaint, and life."""
+    graph.image()
+    for topic in PROPOSALS:
+        graph.stamp_ns += PERIOD_NS
+        graph.tell({topic: (math.inf, math.nan)})
+        graph.bench.wait_for_complaint(f'/{topic.name}: position of')
+    graph.image({})
+    assert len(graph.bench.heard(JOINT_COMMANDS)) == 2
+
+
+def test_count_of_trials_outlives_the_gate(make_graph, tmp_path):
+    path = tmp_path / 'trials'
+    path.write_text('41\n')
+    graph = make_graph(trials_file=str(path), dwell_s=0.0, max_shifts=1, settle_timeout_s=0.05)
+    for _ in range(6):
+        graph.image({FACE_DELTA: (0.0, 0.0)})
+    trials = int(graph.status()[1]['trials'])
+    assert trials > 41
+    assert path.read_text() == f'{trials}\n'
+    assert [each.name for each in tmp_path.iterdir()] == ['trials']
+
+
+def test_joint_trajectory_has_one_point_to_be_taken_at_once(make_bench):
+    parameters = {'output': 'joint_trajectory', 'time_from_start_s': 1.25, 'lockstep': True}
+    hears = [JOINT_COMMANDS, GATE_STATUS, JOINT_TRAJECTORY]
+    bench = make_bench(GateNode, SAYS, hears, use_sim_time=True, **parameters)
+    graph = Graph(bench)
+    graph.image()
+    graph.image()
+    bench.wait(lambda: len(bench.heard(JOINT_TRAJECTORY)) == 2)
+    trajectory = bench.heard(JOINT_TRAJECTORY)[-1]
+    assert to_ns(trajectory.header.stamp) == 0
+    assert list(trajectory.joint_names) == ['pan', 'tilt']
+    [point] = trajectory.points
+    assert to_ns(point.time_from_start) == 1_250_000_000
+    assert list(point.positions) == list(bench.heard(JOINT_COMMANDS)[-1].position)
+    assert point.positions[0] != 0.0
+
+
+def test_forward_commands_stand_in_the_order_of_the_controller(make_bench):
+    parameters = {'output': 'float64_multi_array', 'joint_order': 'tilt_pan', 'lockstep': True}
+    parameters |= {'pan_inverted': True, 'pan_offset_rad': 0.5, 'tilt_offset_rad': -0.25}
+    hears = [JOINT_COMMANDS, GATE_STATUS, FORWARD_COMMANDS]
+    bench = make_bench(GateNode, SAYS, hears, use_sim_time=True, **parameters)
+    graph = Graph(bench)
+    graph.pan = 0.4  # in the rig's count: 0.1 to the left of the middle
+    graph.image()
+    bench.wait(lambda: bench.heard(FORWARD_COMMANDS))
+    assert list(bench.heard(FORWARD_COMMANDS)[-1].data) == pytest.approx([0.0, 0.4])
+
+
+URDF = """<robot name="head"><link name="base"/><link name="neck"/><link name="eye"/>
+<joint name="pan" type="revolute"><parent link="base"/><child link="neck"/>
+<axis xyz="0 0 1"/><limit lower="-0.2" upper="0.3" velocity="1.0" effort="1"/></joint>
+<joint name="tilt" type="revolute"><parent link="neck"/><child link="eye"/>
+<axis xyz="0 {tilt} 0"/><limit lower="-0.4" upper="0.2" velocity="1.0" effort="1"/></joint>
+</robot>"""
+
+
+def test_limits_of_the_robot_description(make_bench):
+    says = [*SAYS, ROBOT_DESCRIPTION]
+    hears = [JOINT_COMMANDS, GATE_STATUS]
+    parameters = {'limits_from': 'robot_description', 'lockstep': True, 'use_sim_time': True}
+    bench = make_bench(GateNode, says, hears, max_acceleration_rad_s2=1e4, **parameters)
+    graph = Graph(bench)
+    assert graph.image().position[0] == 0.0
+    assert graph.image().position[0] == 0.0
+    assert graph.status()[1]['reason'] == 'no robot_description yet'
+    bench.say(ROBOT_DESCRIPTION, String(data=URDF.format(tilt=-1)))
+    bench.wait_for_complaint('/robot_description: the URDF turns tilt about')
+    graph.image()
+    assert graph.status()[1]['reason'] == 'robot_description cannot be used'
+    bench.say(ROBOT_DESCRIPTION, String(data=URDF.format(tilt=1)))
+    bench.wait(lambda: bench.received(ROBOT_DESCRIPTION) == 2)
+    commands = [graph.image({FACE_DELTA: (-2.0, 0.0)}).position[0] for _ in range(6)]
+    assert commands[1] - commands[0] == pytest.approx(-0.1), 'the speed of the URDF'
+    assert min(commands) == pytest.approx(-0.18)
+
+
+class RealTime:
+    """A gate on its own clock, and a head that obeys; the test plays the camera."""
+
+    def __init__(self, make_bench, **parameters):
+        says = [*PROPOSALS, JOINT_STATES]
+        self.bench = make_bench(GateNode, says, [JOINT_COMMANDS, GATE_STATUS], **parameters)
+        self.pan = 0.0
+        self._due_s = 0.0
+
+    def image(self, proposals=FACE_RIGHT, without=(), age_s=0.0, joints=True):
+        stamp_ns = time.time_ns() - int(age_s * 1e9)
+        if joints:
+            self.bench.say_posture(stamp_ns, self.pan)
+        for topic in PROPOSALS:
+            if topic not in without:
+                self.bench.say(topic, joint_state(stamp_ns, *proposals.get(topic, ())))
+
+    def images(self, until, **image):
+        """Images, 30 a second, until something holds."""
+
+        def another():
+            if time.monotonic() >= self._due_s:
+                self._due_s = time.monotonic() + 1 / 30
+                self.image(**image)
+            self.bench.executor.spin_once(timeout_sec=0.01)
+            commands = self.bench.heard(JOINT_COMMANDS)
+            if commands:
+                self.pan = commands[-1].position[0]
+            return until()
+
+        self.bench.wait(another)
+
+    def reason(self):
+        statuses = self.bench.heard(GATE_STATUS)
+        values = {value.key: value.value for value in statuses[-1].values} if statuses else {}
+        return values.get('reason', '')
+
+
+@pytest.fixture
+def real_time(make_bench):
+    return lambda **parameters: RealTime(make_bench, **parameters)
+
+
+def test_commands_come_at_the_control_rate_and_follow_the_profile(real_time):
+    rig = real_time(silent_after_s=5.0, stall_after_s=5.0)
+    rig.images(lambda: rig.pan < -0.2)
+    commands = rig.bench.heard(JOINT_COMMANDS)
+    pans = [command.position[0] for command in commands]
+    images = {to_ns(command.header.stamp) for command in commands}
+    assert len(images) < len(commands), 'more commands than images'
+    step = np.abs(np.diff(pans)).max()
+    assert step == pytest.approx(SPEED / 100.0)
+    assert pans[-1] == min(pans)
+
+
+def test_silence_brakes_the_head_names_what_is_missing_and_passes(real_time):
+    rig = real_time(silent_after_s=1.0, stale_after_s=9.0, stall_after_s=9.0)
+    rig.images(lambda: rig.pan < -0.1)
+    rig.images(lambda: rig.reason(), without=[LM_DELTA, VF_DELTA])
+    assert 'missing: learning_module/delta, visual_feedback/delta' in rig.reason()
+    assert 'holding the head' in rig.bench.complaint()
+    still = rig.bench.next(JOINT_COMMANDS, 20).position
+    assert rig.bench.next(JOINT_COMMANDS, 5).position == still
+    rig.images(lambda: not rig.reason())
+    rig.images(lambda: rig.pan < still[0] - 0.1)
+
+
+def test_missing_joint_states_are_named(real_time):
+    rig = real_time(silent_after_s=1.0, stale_after_s=9.0, stall_after_s=9.0)
+    rig.images(lambda: rig.pan < -0.05)
+    rig.images(lambda: rig.reason(), joints=False)
+    assert rig.reason().endswith('missing: joint_states')
+
+
+@pytest.mark.parametrize(
+    ('age_s', 'text'), [(2.0, 'image is older than'), (-2.0, 'stamped ahead of the clock')]
+)
+def test_image_of_another_time_holds_the_head(real_time, age_s, text):
+    rig = real_time(silent_after_s=5.0)
+    rig.images(lambda: text in rig.reason(), age_s=age_s)
+    assert not rig.bench.heard(JOINT_COMMANDS), 'nothing was ever commanded'

@@ -18,16 +18,27 @@ class JointConfig:
     tilt_joint: str = parameter('tilt', 'name of the tilt joint')
     pan_inverted: bool = parameter(False, 'the rig counts pan to the right as positive')
     tilt_inverted: bool = parameter(False, 'the rig counts tilt upward as positive')
+    pan_offset_rad: float = parameter(
+        0.0, "what the rig's pan joint says when the head looks ahead", low=-6.3, high=6.3
+    )
+    tilt_offset_rad: float = parameter(
+        0.0, "what the rig's tilt joint says when the head looks level", low=-6.3, high=6.3
+    )
 
 
 class JointCodec:
-    """Between (pan, tilt) in REP-103 axes and JointState in the rig's own names and signs."""
+    """Between (pan, tilt) in REP-103 axes and JointState in the rig's own names and signs.
+
+    `encode` and `decode` are for changes and directions, `encode_posture` and `decode_posture` for
+    what the joints themselves say or are told: rig angle = sign * angle + offset.
+    """
 
     def __init__(self, config: JointConfig) -> None:
         self.names = [config.pan_joint, config.tilt_joint]
-        self._signs = np.array(
+        self.signs = np.array(
             [-1.0 if config.pan_inverted else 1.0, -1.0 if config.tilt_inverted else 1.0]
         )
+        self.offsets = np.array([config.pan_offset_rad, config.tilt_offset_rad])
 
     def encode(
         self, header: Header, angles: ArrayLike | None, velocity: ArrayLike | None = None
@@ -50,6 +61,19 @@ class JointCodec:
             return None
         return self._from_rig(message, message.position, 'position')
 
+    def encode_posture(
+        self, header: Header, posture: ArrayLike, velocity: ArrayLike | None = None
+    ) -> JointState:
+        """Message for what the joints are or shall be, (2,) [rad], [rad/s]."""
+        message = self.encode(header, posture, velocity)
+        message.position = (np.asarray(message.position) + self.offsets).tolist()
+        return message
+
+    def decode_posture(self, message: JointState) -> NDArray[np.float64] | None:
+        """What the joints are or shall be, (2,) [rad]; None and errors as for `decode`."""
+        angles = self.decode(message)
+        return None if angles is None else angles - self.signs * self.offsets
+
     def decode_velocity(self, message: JointState) -> NDArray[np.float64] | None:
         """Velocity (2,) [rad/s], or None where the message gives none.
 
@@ -60,7 +84,7 @@ class JointCodec:
         return self._from_rig(message, message.velocity, 'velocity')
 
     def _to_rig(self, values: ArrayLike) -> list[float]:
-        return (self._signs * np.asarray(values, float)).tolist()
+        return (self.signs * np.asarray(values, float)).tolist()
 
     def _from_rig(self, message: JointState, values: ArrayLike, what: str) -> NDArray[np.float64]:
         names = list(message.name)
@@ -70,7 +94,7 @@ class JointCodec:
         values = np.asarray(values, float)
         if len(values) != len(names):
             raise ValueError(f'{len(values)} numbers in {what} for {len(names)} names')
-        angles = self._signs * values[[names.index(name) for name in self.names]]
+        angles = self.signs * values[[names.index(name) for name in self.names]]
         if not np.isfinite(angles).all():
             raise ValueError(f'{what} of {self.names} is not finite: {angles.tolist()}')
         return angles

@@ -42,7 +42,7 @@ class PostureListener:
         self._act()
 
     def _on_joint_states(self, message: JointState) -> None:
-        position = self._joints.decode(message)
+        position = self._joints.decode_posture(message)
         if position is None:
             raise ValueError('the message names no joints')
         velocity = self._joints.decode_velocity(message)

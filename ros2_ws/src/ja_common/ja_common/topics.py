@@ -12,7 +12,8 @@ from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState, PointCloud2
-from std_msgs.msg import Float32
+from std_msgs.msg import Float32, Float64MultiArray, String
+from trajectory_msgs.msg import JointTrajectory
 
 
 def _qos(reliable: bool, depth: int, latched: bool = False) -> QoSProfile:
@@ -91,6 +92,21 @@ FIXATION = Topic(
 )
 JOINT_COMMANDS = Topic(
     'joint_commands', JointState, 'absolute posture the head shall take, limited', **_LINK
+)
+JOINT_TRAJECTORY = Topic(
+    'joint_trajectory_controller/joint_trajectory',
+    JointTrajectory,
+    'the same for a ros2_control joint_trajectory_controller, if so configured',
+    **_LINK,
+)
+FORWARD_COMMANDS = Topic(
+    'forward_position_controller/commands',
+    Float64MultiArray,
+    'the same for a ros2_control forward_command_controller, if so configured',
+    **_LINK,
+)
+ROBOT_DESCRIPTION = Topic(
+    'robot_description', String, 'URDF, from which the gate may take joint limits', **_LATCHED
 )
 GATE_STATUS = Topic(
     'gate/status', DiagnosticStatus, 'phase, source, p(LM), limits, reason of a hold', **_LINK

@@ -1,20 +1,21 @@
 """`gate`: arbitrates between visual feedback and the learner, and alone commands the head."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Header
+from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, Trigger
 
-from ja_common.core.config import parameter
+from ja_common.core.config import ConfigError, parameter
 from ja_common.core.health import Level
-from ja_common.core.posture import Posture
+from ja_common.core.posture import REORDERED_WITHIN_S, Posture
 from ja_common.core.stamp_join import StampJoin
 from ja_common.core.stamps import NS_PER_S
 from ja_common.graph_node import GraphNode, spin_node
@@ -25,75 +26,141 @@ from ja_common.topics import (
     FACE_DELTA,
     FIXATION,
     GATE_STATUS,
-    JOINT_COMMANDS,
     JOINT_STATES,
     LM_DELTA,
+    ROBOT_DESCRIPTION,
     VF_DELTA,
     Topic,
 )
+from ja_control.command_output import CommandOutput, CommandOutputConfig
 from ja_control.core.attention_cycle import (
     AttentionCycle,
     AttentionCycleConfig,
     Decision,
     Percept,
 )
+from ja_control.core.border import Border, BorderConfig, Cause, Command, Hold
 from ja_control.core.gating import Gating, GatingConfig
-from ja_control.core.joint_limits import JointLimits, JointLimitsConfig
+from ja_control.core.joint_limits import JointLimitsConfig
+from ja_control.core.trial_count import load_trials, save_trials
+from ja_control.core.urdf_limits import narrowed, read_joint
 
 _PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, FIXATION)
+# Longer than any image takes; a clock that is set forward is no time in which the head turns.
+_LONGEST_STEP_S = 2.0
+_STATUS_EVERY_S = 0.1
 
 
 @dataclass(frozen=True)
 class GateConfig:
-    """What the gate needs beyond the cycle, the gating and the limits."""
+    """What the gate needs beyond the cycle, the gating and the border."""
 
     seed: int = parameter(0, 'seed of the draws between VF and LM', low=0)
     enabled_at_start: bool = parameter(True, 'move from the start, without a call of `enable`')
-    stale_after_s: float = parameter(
-        0.5, 'hold when the newest image is older, or an input silent for longer',
-        low=0.02, high=60.0,
-    )  # fmt: skip
+    lockstep: bool = parameter(
+        False,
+        'time is that of the images: one command an image, and nothing is ever late '
+        '(else: commands at control_rate_hz, whatever the camera does)',
+    )
+    control_rate_hz: float = parameter(
+        100.0, 'commands a second, and steps of the motion profile', low=10.0, high=500.0
+    )
+    limits_from: str = parameter(
+        'parameters',
+        'where the joint limits come from; with a URDF the narrower of both hold, and none moves '
+        'before it has come',
+        choices=('parameters', 'robot_description'),
+    )
+    trials_file: str = parameter(
+        '', 'where the count of trials outlives a restart; empty: nowhere'
+    )
 
 
 class GateNode(GraphNode):
-    """One command for every image on which all proposals have come; holds when they do not."""
+    """Takes one decision for every image on which all proposals have come, and has it obeyed.
+
+    In real time a steady timer steps the border; commands carry the header of the image that they
+    follow, and the time of the clock while the head is held.
+    """
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('gate', **node_kwargs)
         self._config = self.configure(GateConfig)
         self._joints = JointCodec(self.configure(JointConfig))
-        self._limits = JointLimits(self.configure(JointLimitsConfig, self._set_limits))
+        self._limits = self.configure(JointLimitsConfig, self._set_limits)
+        self._urdf = ''
+        self._border = Border(
+            self._limits,
+            self.configure(BorderConfig, self._set_border),
+            1.0 / self._config.control_rate_hz,
+            self._config.enabled_at_start,
+        )
         self._cycle = AttentionCycle(
             self.configure(AttentionCycleConfig, self._set_cycle),
             Gating(self.configure(GatingConfig, self._set_gating)),
             np.random.default_rng(self._config.seed),
+            lambda target: self._border.limits.reachable(target),
         )
-        self._enabled = self._config.enabled_at_start
+        self._trials_file = Path(self._config.trials_file).expanduser()
+        self._cycle.trials = self._kept_trials()
 
         self._postures = PostureListener(self, self._joints)
         self._join = StampJoin([topic.name for topic in _PROPOSALS])
-        self._last_stamp_ns = 0
-        self._last_command: JointState | None = None
-        self._commanded = np.full(2, np.nan)
-        self._heard_all_s = time.monotonic()
-        self._holding = ''
+        self._header = Header()
+        self._stamp_ns = 0
+        self._decision: Decision | None = None
+        self._answer: JointState | None = None
+        self._border_hold: Hold | None = None
+        self._hold: Hold | None = None
+        self._told_s = -np.inf
 
         for topic in _PROPOSALS:
             self.hear(topic, self._collector(topic), expected_every_s=2.0)
-        self._commands = self.say(JOINT_COMMANDS)
+        self._output = CommandOutput(self, self.configure(CommandOutputConfig))
         self._status = self.say(GATE_STATUS)
         self.offer(SetBool, 'enable', self._on_enable)
         self.offer(Trigger, 'home', self._on_home)
-        self.create_timer(0.1, self._hold_if_silent, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        if self._config.limits_from == 'robot_description':
+            self._border.blocked = f'no {ROBOT_DESCRIPTION.name} yet'
+            self.hear(ROBOT_DESCRIPTION, self._on_robot_description)
+        if not self._config.lockstep:
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            self.create_timer(1.0 / self._config.control_rate_hz, self._on_period, clock=steady)
 
     def _set_limits(self, config: JointLimitsConfig) -> None:
-        self._limits = JointLimits(config)
+        self._limits = config
+        if self._urdf:
+            self._narrow_limits()
+        else:
+            self._border.set_limits(config)
+
+    def _set_border(self, config: BorderConfig) -> None:
+        self._border.config = config
 
     def _set_cycle(self, config: AttentionCycleConfig) -> None:
         self._cycle.config = config
 
     def _set_gating(self, config: GatingConfig) -> None:
         self._cycle.gating = Gating(config)
+
+    def _kept_trials(self) -> int:
+        if not self._config.trials_file:
+            return 0
+        try:
+            return load_trials(self._trials_file)
+        except ValueError as error:
+            raise ConfigError(f'trials_file: {error}') from None
+
+    def _on_robot_description(self, message: String) -> None:
+        self._urdf = message.data
+        self._border.blocked = f'{ROBOT_DESCRIPTION.name} cannot be used'
+        self._narrow_limits()
+        self._border.blocked = ''
+
+    def _narrow_limits(self) -> None:
+        pan, tilt = (read_joint(self._urdf, name) for name in self._joints.names)
+        joints = self._joints
+        self._border.set_limits(narrowed(self._limits, pan, tilt, joints.signs, joints.offsets))
 
     def _collector(self, topic: Topic) -> Any:
         def collect(message: JointState) -> None:
@@ -105,70 +172,111 @@ class GateNode(GraphNode):
         return collect
 
     def _act(self, header: Header, proposals: dict[str, Any], posture: Posture) -> None:
-        self._heard_all_s = time.monotonic()
-        stamp_ns = posture.stamp_ns
-        answered = self._last_command is not None and stamp_ns == self._last_stamp_ns
-        if answered and not self._holding:
+        """Everybody has judged an image."""
+        lockstep = self._config.lockstep
+        step_s = (posture.stamp_ns - self._stamp_ns) / NS_PER_S
+        if step_s == 0.0:
             # The same image again (a sim that lost the answer): the same answer again.
-            self._commands.publish(self._last_command)
+            if lockstep and self._answer is not None:
+                self._output.publish(self._answer)
             return
-        seconds = (stamp_ns - self._last_stamp_ns) / NS_PER_S
-        if -1.0 < seconds < 0.0:
+        if -REORDERED_WITHIN_S < step_s < 0.0:
             return  # late: a newer image has been answered already
-        reason = self._reason_to_hold(stamp_ns)
-        if reason:
-            self._hold(header, reason)
-        else:
-            if seconds < 0.0 or self._holding or self._last_command is None:
-                # The clock was set back, or the head was held: start from where it stands.
-                self._cycle.restart()
-                self._commanded = self._where_it_stands()
-                seconds = 0.0
-            self._holding = ''
-            percept = Percept(
+        if step_s < 0.0:
+            self._border.begin_anew()  # the clock was set back
+        self._header, self._stamp_ns = header, posture.stamp_ns
+        now_s = self._now_s()
+        self._border.hear_image(now_s, self._age_s(posture.stamp_ns))
+        self._decision = self._decide(proposals, posture)
+        if lockstep:
+            seconds = min(max(step_s, 0.0), _LONGEST_STEP_S)
+            self._step(now_s, max(1, round(seconds * self._config.control_rate_hz)))
+
+    def _decide(self, proposals: dict[str, Any], posture: Posture) -> Decision | None:
+        if not self._border.engaged:
+            self._cycle.restart()
+            return None
+        trials = self._cycle.trials
+        decision = self._cycle.step(
+            Percept(
                 posture,
                 face_delta=proposals[FACE_DELTA.name],
                 vf_delta=proposals[VF_DELTA.name],
                 lm_delta=proposals[LM_DELTA.name],
                 fixation=proposals[FIXATION.name],
             )
-            # A clock set forward is no time in which the head could have turned.
-            seconds = min(seconds, self._config.stale_after_s)
-            self._command(header, self._cycle.step(percept), seconds)
-        self._last_stamp_ns = stamp_ns
+        )
+        self._border.aim(decision.target)
+        if decision.trials != trials and self._config.trials_file:
+            save_trials(self._trials_file, decision.trials)
+        return decision
 
-    def _reason_to_hold(self, stamp_ns: int) -> str:
-        if not self._enabled:
-            return 'disabled'
-        age_s = (self.get_clock().now().nanoseconds - stamp_ns) / NS_PER_S
-        if age_s > self._config.stale_after_s:
-            return f'the newest image is {age_s:.1f} s old'
-        return ''
+    def _now_s(self) -> float:
+        # In lockstep time passes from image to image; on a rig it passes whatever comes.
+        return self._stamp_ns / NS_PER_S if self._config.lockstep else time.monotonic()
 
-    def _command(self, header: Header, decision: Decision, seconds: float) -> None:
-        limited = self._limits.limit(decision.target, self._commanded, seconds)
-        self._publish(header, limited.posture)
-        self._tell(Level.OK, decision.phase.value, decision, clamped=limited.clamped)
+    def _age_s(self, stamp_ns: int) -> float:
+        if self._config.lockstep:
+            return 0.0
+        return (self.get_clock().now().nanoseconds - stamp_ns) / NS_PER_S
 
-    def _hold(self, header: Header, reason: str) -> None:
-        posture = self._commanded if self._holding else self._where_it_stands()
-        self._holding = reason
-        self._publish(header, posture)
-        self._tell(Level.WARN, f'hold: {reason}', None, reason=reason)
+    def _on_period(self) -> None:
+        try:
+            self._step(self._now_s(), 1)
+        except ValueError as error:
+            self.problem('control', f'control: {error}')
 
-    def _where_it_stands(self) -> np.ndarray:
-        # Now, not at the image's stamp: an image may be old, and so would be its posture.
+    def _step(self, now_s: float, periods: int) -> None:
         newest = self._postures.newest
-        assert newest is not None, 'nothing is commanded before a joint state has come'
-        return self._limits.clip(newest.position)
+        if newest is not None:
+            self._border.hear_joints(newest.position, now_s, self._age_s(newest.stamp_ns))
+        command = self._border.step(now_s, periods)
+        news = self._note_hold(command.hold)
+        if self._config.lockstep and command.position is None and newest is not None:
+            # The sim waits for an answer even of a gate that may not move.
+            command = replace(command, position=newest.position)
+        if command.position is not None:
+            self._publish(command)
+        due = self._config.lockstep or now_s - self._told_s >= _STATUS_EVERY_S
+        if news or due or self._decision is not None:
+            self._tell(command)
+            self._told_s = now_s
+            self._decision = None
 
-    def _publish(self, header: Header, posture: np.ndarray) -> None:
-        self._commanded = posture
-        self._last_command = self._joints.encode(header, posture)
-        self._commands.publish(self._last_command)
+    def _publish(self, command: Command) -> None:
+        assert command.position is not None
+        header = self._header
+        if command.hold is not None and not self._config.lockstep:
+            header = Header(stamp=self.get_clock().now().to_msg(), frame_id=header.frame_id)
+        self._answer = self._joints.encode_posture(header, command.position, command.velocity)
+        self._output.publish(self._answer)
 
-    def _tell(self, level: Level, message: str, decision: Decision | None, **more: str) -> None:
-        values = {'trials': str(self._cycle.trials), 'enabled': str(self._enabled), **more}
+    def _note_hold(self, hold: Hold | None) -> bool:
+        """Keep why the head is held, with the topics that are missing; whether it is news."""
+        news, self._border_hold = hold != self._border_hold, hold
+        if news and hold is not None and hold.cause is Cause.SILENT:
+            behind = self._postures.is_behind
+            missing = [JOINT_STATES.name] if behind else sorted(self._join.missing())
+            hold = Hold(hold.cause, f'{hold.text}; missing: {", ".join(missing)}')
+        if news:
+            self._hold = hold
+        if self._hold is None:
+            self.health.resolved('hold')
+        else:
+            self.problem('hold', f'holding the head: {self._hold.text}', self._hold.level)
+        return news
+
+    def _tell(self, command: Command) -> None:
+        hold, decision = self._hold, self._decision
+        values = {
+            'trials': str(self._cycle.trials),
+            'enabled': str(self._border.enabled),
+            'phase': self._cycle.phase.value,
+        }
+        level, message = Level.OK, self._cycle.phase.value
+        if hold is not None:
+            level, message = hold.level, f'hold: {hold.text}'
+            values['reason'] = hold.text
         if decision is not None:
             values |= {
                 'phase': decision.phase.value,
@@ -176,6 +284,7 @@ class GateNode(GraphNode):
                 'p_lm': f'{decision.p_lm:.4f}',
                 'shifts': str(decision.shifts),
             }
+        values['clamped'] = command.clamped
         self._status.publish(
             DiagnosticStatus(
                 level=bytes([level]),
@@ -185,25 +294,14 @@ class GateNode(GraphNode):
             )
         )
 
-    def _hold_if_silent(self) -> None:
-        silent_s = time.monotonic() - self._heard_all_s
-        if silent_s < self._config.stale_after_s or self._holding:
-            return
-        if self._last_command is None:
-            return  # nothing was ever commanded
-        missing = [JOINT_STATES.name] if self._postures.is_behind else self._join.missing()
-        reason = f'no {", ".join(sorted(missing))} for {silent_s:.1f} s'
-        self.problem('hold', f'holding the head where it is: {reason}', Level.WARN)
-        self._hold(Header(stamp=self.get_clock().now().to_msg()), reason)
-
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> Any:
-        self._enabled = request.data
+        self._border.enable(request.data)
         response.success = True
         response.message = 'enabled' if request.data else 'disabled: the head holds its posture'
         return response
 
     def _on_home(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        if not self._enabled:
+        if not self._border.enabled:
             raise ValueError('the gate is disabled: call enable first')
         self._cycle.go_home()
         response.success, response.message = True, 'turning to the home posture'

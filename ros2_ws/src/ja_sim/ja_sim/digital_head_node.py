@@ -39,14 +39,16 @@ class DigitalHeadNode(GraphNode):
         self.hear(WIDE_IMAGE, self._on_wide_image, expected_every_s=2.0)
 
     def _on_command(self, message: JointState) -> None:
-        posture = self._joints.decode(message)
+        posture = self._joints.decode_posture(message)
         if posture is not None:
             self._head.command(posture)
 
     def _on_wide_image(self, message: Image) -> None:
         view, posture = self._head.look(decode_image(message), to_ns(message.header.stamp))
         header = Header(stamp=message.header.stamp, frame_id=self._frame_id)
-        self._says_joints.publish(self._joints.encode(header, posture.position, posture.velocity))
+        self._says_joints.publish(
+            self._joints.encode_posture(header, posture.position, posture.velocity)
+        )
         width, height = self._config.view_width_px, self._config.view_height_px
         self._says_info.publish(encode_camera_info(header, width, height, self._head.focal_px))
         self._says_image.publish(encode_image(view, header.stamp, header.frame_id))

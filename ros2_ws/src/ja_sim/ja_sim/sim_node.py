@@ -118,7 +118,7 @@ class SimNode(GraphNode):
         answers_image = message.header.stamp == self._round.image.header.stamp
         if self._config.lockstep and not answers_image:
             return  # an answer to an image sent twice, or a hold while the sim stood still
-        posture = self._joints.decode(message)
+        posture = self._joints.decode_posture(message)
         if posture is None:
             raise ValueError('a command names no joints')
         self._world.command(posture)
@@ -156,7 +156,9 @@ class SimNode(GraphNode):
             self._world.step(1 / (self._config.camera_rate_hz * parts))
             sample = self._world.joint_state()
             header = self._header(sample.stamp_ns)
-            joint_states.append(self._joints.encode(header, sample.position, sample.velocity))
+            joint_states.append(
+                self._joints.encode_posture(header, sample.position, sample.velocity)
+            )
         observation = self._world.observe()
         header = self._header(observation.stamp_ns, CAMERA_FRAME)
         now = self._header(self._world.now_ns).stamp

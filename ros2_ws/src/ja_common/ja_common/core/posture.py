@@ -12,6 +12,12 @@ from ja_common.core.stamps import NS_PER_S
 
 Item = TypeVar('Item')
 
+REORDERED_WITHIN_S = 0.25
+"""A sample older than the newest by more than this was not overtaken: the clock was set back."""
+
+LONGEST_GAP_S = 0.5
+"""Between samples farther apart than this nobody knows where the head was."""
+
 STILL_BELOW_RAD_S = 0.05
 """Speed [rad/s] below which a joint stands still, unless a node is told another."""
 
@@ -32,8 +38,9 @@ class Posture:
 class PostureHistory:
     """Joint states of the last seconds, interpolated linearly at any stamp among them.
 
-    Out-of-order samples are put in order, duplicates are dropped. A sample older than everything
-    kept means that the clock was set back: the history starts again from it.
+    Samples that overtook each other are put in order, duplicates are dropped. One that is older by
+    more means that the clock was set back: the history starts again from it. No gap of more than
+    half a second is bridged.
     """
 
     def __init__(self, horizon_s: float = 2.0) -> None:
@@ -47,7 +54,7 @@ class PostureHistory:
         Raises ValueError for values that are not two finite numbers; nothing is then added.
         """
         position = _two_finite('joint position', position)
-        if self._stamps and stamp_ns < self._stamps[-1] - self._horizon_ns:
+        if self._stamps and stamp_ns < self._stamps[-1] - _ns(REORDERED_WITHIN_S):
             self.clear()
         index = bisect_left(self._stamps, stamp_ns)
         if index < len(self._stamps) and self._stamps[index] == stamp_ns:
@@ -76,7 +83,7 @@ class PostureHistory:
         return self._samples[-1] if self._samples else None
 
     def at(self, stamp_ns: int) -> Posture | None:
-        """Posture at a stamp; None when the stamp lies outside of what is known (yet)."""
+        """Posture at a stamp; None outside of what is known (yet), and within a gap."""
         index = bisect_left(self._stamps, stamp_ns)
         if index == len(self._stamps):
             return None
@@ -86,6 +93,8 @@ class PostureHistory:
         if index == 0:
             return None
         before = self._samples[index - 1]
+        if after.stamp_ns - before.stamp_ns > _ns(LONGEST_GAP_S):
+            return None
         share = (stamp_ns - before.stamp_ns) / (after.stamp_ns - before.stamp_ns)
         return Posture(
             stamp_ns,
@@ -132,6 +141,10 @@ class PostureJoin(Generic[Item]):
             return None
         stamps = (stamp_ns for stamp_ns, _ in self._waiting)
         return next((i for i, stamp_ns in enumerate(stamps) if stamp_ns <= newest.stamp_ns), None)
+
+
+def _ns(seconds: float) -> int:
+    return int(seconds * NS_PER_S)
 
 
 def _two_finite(what: str, values: ArrayLike) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ looks at the caregiver.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -104,14 +105,23 @@ class Decision:
 
 
 class AttentionCycle:
-    """The state of the cycle; every random draw comes from the generator it is given."""
+    """The state of the cycle; every random draw comes from the generator it is given.
+
+    `reachable` gives the posture (2,) [rad] at which a motion towards a target ends: a shift that
+    is aimed outside the limits has arrived where the limits end.
+    """
 
     def __init__(
-        self, config: AttentionCycleConfig, gating: Gating, rng: np.random.Generator
+        self,
+        config: AttentionCycleConfig,
+        gating: Gating,
+        rng: np.random.Generator,
+        reachable: Callable[[NDArray[np.float64]], NDArray[np.float64]] = np.asarray,
     ) -> None:
         self.config = config
         self.gating = gating
         self._rng = rng
+        self._reachable = reachable
         self.trials = 0
         self._caregiver: NDArray[np.float64] | None = None
         self._target: NDArray[np.float64] | None = None
@@ -239,7 +249,11 @@ class AttentionCycle:
             self._target is not None
             and percept.posture.stamp_ns != self._since_ns
             and self._still(percept)
-            and _within(percept.posture.position, self._target, self.config.arrived_within_rad)
+            and _within(
+                percept.posture.position,
+                self._reachable(self._target),
+                self.config.arrived_within_rad,
+            )
         )
 
 

@@ -1,0 +1,66 @@
+"""Commands as rigs take them: JointState, JointTrajectory, or Float64MultiArray."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from builtin_interfaces.msg import Duration
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, Header
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from ja_common.core.config import parameter
+from ja_common.core.stamps import NS_PER_S
+from ja_common.graph_node import GraphNode
+from ja_common.topics import FORWARD_COMMANDS, JOINT_COMMANDS, JOINT_TRAJECTORY
+
+
+@dataclass(frozen=True)
+class CommandOutputConfig:
+    """Which message the rig obeys; `joint_commands` is published in any case."""
+
+    output: str = parameter(
+        'joint_state', 'what the rig obeys',
+        choices=('joint_state', 'joint_trajectory', 'float64_multi_array'),
+    )  # fmt: skip
+    joint_order: str = parameter(
+        'pan_tilt', 'order of the numbers of float64_multi_array', choices=('pan_tilt', 'tilt_pan')
+    )
+    time_from_start_s: float = parameter(
+        0.05, 'when the point of joint_trajectory is to be reached', low=0.001, high=5.0
+    )
+
+
+class CommandOutput:
+    """Publishes each command on `joint_commands`, and once more as the rig's controller takes it.
+
+    JointTrajectory: a single point with a stamp of zero, 'as soon as it comes', so that the
+    clocks of the two machines do not matter. Float64MultiArray: the numbers in the order of the
+    controller's `joints`.
+    """
+
+    def __init__(self, node: GraphNode, config: CommandOutputConfig) -> None:
+        self._config = config
+        self._joint_commands = node.say(JOINT_COMMANDS)
+        topic = {'joint_trajectory': JOINT_TRAJECTORY, 'float64_multi_array': FORWARD_COMMANDS}
+        self._controller = node.say(topic[config.output]) if config.output in topic else None
+
+    def publish(self, command: JointState) -> None:
+        """Send a command: names, position [rad], velocity [rad/s], in the rig's signs."""
+        self._joint_commands.publish(command)
+        if self._controller is not None:
+            self._controller.publish(self._for_controller(command))
+
+    def _for_controller(self, command: JointState) -> Any:
+        if self._config.output == 'float64_multi_array':
+            step = 1 if self._config.joint_order == 'pan_tilt' else -1
+            return Float64MultiArray(data=list(command.position)[::step])
+        fraction, whole = math.modf(self._config.time_from_start_s)
+        start = Duration(sec=int(whole), nanosec=round(fraction * NS_PER_S))
+        # Without velocities: the point stands for itself, and a lost successor leaves the head
+        # at rest in it.
+        point = JointTrajectoryPoint(
+            positions=np.asarray(command.position).tolist(), time_from_start=start
+        )
+        return JointTrajectory(header=Header(), joint_names=list(command.name), points=[point])

@@ -1,0 +1,305 @@
+"""The border between deciding and moving: what passes is safe, what is missing holds the head.
+
+In this order: an aim must be finite; what was heard must be fresh; aims within the dead zone of
+the last one are the last one; the motion profile limits speed and acceleration, relative to the
+*previous command*; aims lie inside the position limits by a soft margin, which only braking may
+use. After every hold the command begins anew at the measured posture, at rest.
+
+Time is any clock that only runs forward, in seconds; if it runs back, all that was heard is void.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ja_common.core.config import parameter
+from ja_common.core.health import Level
+from ja_control.core.joint_limits import JointLimits, JointLimitsConfig
+from ja_control.core.motion_profile import MotionProfile
+
+_PROGRESS_RAD = 0.02
+"""A joint that has come so much nearer to its command is on its way, not stalled."""
+
+
+@dataclass(frozen=True)
+class BorderConfig:
+    """When the head is held, and when it moves again."""
+
+    dead_zone_rad: float = parameter(
+        0.003, 'a joint whose new aim is no farther from the last one keeps that',
+        low=0.0, high=0.2,
+    )  # fmt: skip
+    stale_after_s: float = parameter(
+        0.5, 'hold when the newest image or joint state is older', low=0.02, high=60.0
+    )
+    silent_after_s: float = parameter(
+        0.13, 'hold when no image has been judged by all for so long', low=0.02, high=60.0
+    )
+    stall_error_rad: float = parameter(
+        0.1, 'a joint farther than this from its command must come nearer', low=0.01, high=3.0
+    )
+    stall_after_s: float = parameter(
+        0.3, 'hold when it has not come nearer for so long', low=0.05, high=10.0
+    )
+    retry_after_s: float = parameter(
+        2.0, 'time for which a stalled head is left alone', low=0.1, high=3600.0
+    )
+    outside_rad: float = parameter(
+        0.3,
+        'a head found outside its limits by less is brought back in; by more it is not moved',
+        low=0.0, high=1.57,
+    )  # fmt: skip
+    latch_faults: bool = parameter(
+        False, 'after a hold wait for a call of `enable` (else: resume when the cause is gone)'
+    )
+
+
+class Cause(Enum):
+    """Why the head is held."""
+
+    DISABLED = 'disabled'
+    BLOCKED = 'blocked'
+    WAITING = 'waiting'
+    SILENT = 'silent'
+    STALE_IMAGE = 'stale image'
+    STALE_JOINTS = 'stale joint states'
+    OUTSIDE = 'outside the limits'
+    STALLED = 'stalled'
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Why the head is held, in one sentence."""
+
+    cause: Cause
+    text: str
+
+    @property
+    def level(self) -> Level:
+        """ERROR where somebody must do something."""
+        return Level.ERROR if self.cause in (Cause.OUTSIDE, Cause.STALLED) else Level.WARN
+
+
+@dataclass(frozen=True)
+class Command:
+    """What to send: position (2,) [rad] and velocity (2,) [rad/s] of (pan, tilt).
+
+    `position` is None while nothing may be sent: until the head has begun for the first time.
+    `clamped` names the limits that have cut the motion ('' for none), `hold` why the head is held.
+    """
+
+    position: NDArray[np.float64] | None
+    velocity: NDArray[np.float64]
+    clamped: str
+    hold: Hold | None
+
+
+class Border:
+    """Every command passes here; one `step` a control period."""
+
+    def __init__(
+        self,
+        limits: JointLimitsConfig,
+        config: BorderConfig,
+        period_s: float,
+        enabled: bool = True,
+    ) -> None:
+        self.limits = JointLimits(limits)
+        self.config = config
+        self.blocked = ''
+        self._limits_config = limits
+        self._new_limits: JointLimitsConfig | None = None
+        self._period_s = period_s
+        self._enabled = enabled
+        self._latched: Hold | None = None
+        self._joints: list[MotionProfile] | None = None
+        self._aim = np.zeros(2)
+        self._follow_since_s = np.zeros(2)
+        self._measured: NDArray[np.float64] | None = None
+        self._follow_from: NDArray[np.float64] | None = None
+        self._now_s = -math.inf
+        self._forget()
+
+    @property
+    def engaged(self) -> bool:
+        """Does the head follow aims? Not during a hold, nor before it has begun anew."""
+        return self._engaged
+
+    @property
+    def enabled(self) -> bool:
+        """As last told."""
+        return self._enabled
+
+    def enable(self, enabled: bool) -> None:
+        """Allow motion or forbid it; allowing it releases what was latched."""
+        self._enabled = enabled
+        if enabled:
+            self._latched = None
+            self._stalled_until_s = -math.inf
+
+    def set_limits(self, limits: JointLimitsConfig) -> None:
+        """New limits; they hold from where the head, braked by the old ones, stands still."""
+        self._new_limits = limits
+
+    def begin_anew(self) -> None:
+        """Brake, and start again from the measured posture."""
+        self._engaged = False
+
+    def hear_image(self, now_s: float, age_s: float) -> None:
+        """An image of this age [s] has been judged by everybody."""
+        self._run_on(now_s)
+        self._judged_s = now_s
+        self._taken_s = now_s - age_s
+
+    def hear_joints(self, position: ArrayLike, now_s: float, age_s: float) -> None:
+        """The newest measured posture (2,) [rad] and its age. Raises ValueError if not finite."""
+        measured = _two_finite('measured posture', position)
+        self._run_on(now_s)
+        self._measured = measured
+        self._measured_s = now_s - age_s
+
+    def aim(self, target: ArrayLike) -> None:
+        """Where to go, (2,) [rad]. Raises ValueError when it is not finite: the aim stays."""
+        target = _two_finite('target posture', target)
+        far = np.abs(target - self._aim) > self.config.dead_zone_rad
+        self._aim = np.where(far, target, self._aim)
+
+    def step(self, now_s: float, periods: int = 1) -> Command:
+        """The command for now; the profile advances by so many control periods."""
+        self._run_on(now_s)
+        hold = self._why_hold()
+        if hold is not None:
+            self._hold(hold)
+        cut: set[str] = set()
+        for _ in range(periods):
+            self._advance(hold, cut)
+        if hold is None and not np.array_equal(self.limits.reachable(self._aim), self._aim):
+            cut.add('position')
+        if self._joints is None:
+            return Command(None, np.zeros(2), '', hold)
+        return Command(
+            np.array([joint.position for joint in self._joints]),
+            np.array([joint.velocity for joint in self._joints]),
+            ' and '.join(sorted(cut)),
+            hold,
+        )
+
+    def _run_on(self, now_s: float) -> None:
+        if now_s < self._now_s:
+            self._forget()
+        self._now_s = now_s
+
+    def _forget(self) -> None:
+        self._measured = None
+        self._measured_s = self._taken_s = self._judged_s = -math.inf
+        self._stalled_until_s = -math.inf
+        self._follow_from = None
+        self._engaged = False
+
+    def _advance(self, hold: Hold | None, cut: set[str]) -> None:
+        """One control period."""
+        at_rest = self._joints is None or not any(joint.velocity for joint in self._joints)
+        if at_rest and self._new_limits is not None:
+            self._take_new_limits()
+        if at_rest and hold is None and not self._engaged:
+            self._begin()
+        if self._joints is None:
+            return
+        follow = self._engaged or (hold is not None and hold.cause is Cause.STALLED)
+        if not follow or self._new_limits is not None:
+            for joint in self._joints:
+                joint.brake()
+            return
+        for joint, aim in zip(self._joints, self.limits.reachable(self._aim), strict=True):
+            if limit := joint.approach(float(aim)):
+                cut.add(limit)
+
+    def _begin(self) -> None:
+        assert self._measured is not None, 'a hold until joint states come'
+        self._joints = self._profiles(self._measured)
+        self._aim = self._measured
+        self._follow_from = None
+        self._engaged = True
+
+    def _take_new_limits(self) -> None:
+        assert self._new_limits is not None
+        self._limits_config, self._new_limits = self._new_limits, None
+        self.limits = JointLimits(self._limits_config)
+        if self._joints is not None:
+            self._joints = self._profiles([joint.position for joint in self._joints])
+
+    def _profiles(self, posture: ArrayLike) -> list[MotionProfile]:
+        c = self._limits_config
+        return [
+            MotionProfile(
+                self._period_s, c.max_speed_rad_s, c.max_acceleration_rad_s2, float(position)
+            )
+            for position in np.asarray(posture)
+        ]
+
+    def _hold(self, hold: Hold) -> None:
+        if self._engaged and hold.cause is Cause.STALLED and self._measured is not None:
+            # Do not push against what blocks the joint.
+            self._aim = self._measured
+        if self._engaged and self.config.latch_faults and hold.cause is not Cause.DISABLED:
+            self._latched = replace(hold, text=f'{hold.text}; latched until enable is called')
+        self._engaged = False
+
+    def _why_hold(self) -> Hold | None:
+        c, now_s = self.config, self._now_s
+        if not self._enabled:
+            return Hold(Cause.DISABLED, 'disabled')
+        if self._latched is not None:
+            return self._latched
+        if self.blocked:
+            return Hold(Cause.BLOCKED, self.blocked)
+        if self._measured is None:
+            return Hold(Cause.WAITING, 'no joint state yet')
+        if math.isinf(self._judged_s):
+            return Hold(Cause.WAITING, 'no complete image yet')
+        # A stamp ahead of the clock is as wrong as an old one: its age cannot be known.
+        for cause, stamp_s, what in (
+            (Cause.STALE_IMAGE, self._taken_s, 'image'),
+            (Cause.STALE_JOINTS, self._measured_s, 'joint state'),
+        ):
+            if now_s - stamp_s > c.stale_after_s:
+                return Hold(cause, f'the newest {what} is older than {c.stale_after_s:g} s')
+            if stamp_s - now_s > c.stale_after_s:
+                return Hold(cause, f'the newest {what} is stamped ahead of the clock')
+        if now_s - self._judged_s > c.silent_after_s:
+            return Hold(Cause.SILENT, f'no complete image for {c.silent_after_s:g} s')
+        if now_s < self._stalled_until_s or self._does_not_follow():
+            text = f'a joint does not follow its command within {c.stall_error_rad:g} rad'
+            return Hold(Cause.STALLED, text)
+        if not self._engaged and self.limits.excess_rad(self._measured) > c.outside_rad:
+            text = f'the head stands more than {c.outside_rad:g} rad outside its limits'
+            return Hold(Cause.OUTSIDE, f'{text}: {self._measured.round(3).tolist()}')
+        return None
+
+    def _does_not_follow(self) -> bool:
+        """Has a joint far from its command come no nearer for `stall_after_s`?"""
+        if not self._engaged or self._joints is None or self._measured is None:
+            return False
+        way = np.array([joint.position for joint in self._joints]) - self._measured
+        far = np.abs(way) > self.config.stall_error_rad
+        if self._follow_from is None:
+            self._follow_from = self._measured.copy()
+            self._follow_since_s = np.full(2, self._now_s)
+        came = np.sign(way) * (self._measured - self._follow_from)
+        fine = ~far | (came > _PROGRESS_RAD)
+        self._follow_from[fine] = self._measured[fine]
+        self._follow_since_s[fine] = self._now_s
+        if np.all(self._now_s - self._follow_since_s <= self.config.stall_after_s):
+            return False
+        self._stalled_until_s = self._now_s + self.config.retry_after_s
+        return True
+
+
+def _two_finite(what: str, values: ArrayLike) -> NDArray[np.float64]:
+    array = np.array(values, float)
+    if array.shape != (2,) or not np.isfinite(array).all():
+        raise ValueError(f'{what} must be two finite angles (pan, tilt), got {array.tolist()}')
+    return array

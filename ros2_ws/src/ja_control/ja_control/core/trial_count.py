@@ -1,0 +1,26 @@
+"""The number of finished trials, which p(LM) depends on, outlives the process."""
+
+import os
+from pathlib import Path
+
+
+def load_trials(path: Path) -> int:
+    """The count in a file; 0 when there is none. Raises ValueError when it holds no count."""
+    try:
+        text = path.read_text(encoding='ascii')
+        return int(text) if text.strip().isdecimal() else _refuse(path)
+    except FileNotFoundError:
+        return 0
+    except UnicodeDecodeError:
+        return _refuse(path)
+
+
+def save_trials(path: Path, trials: int) -> None:
+    """Write the count so that at any instant the file is the old or the new one."""
+    temporary = path.with_name(f'.{path.name}.{os.getpid()}')
+    temporary.write_text(f'{trials}\n', encoding='ascii')
+    os.replace(temporary, path)
+
+
+def _refuse(path: Path) -> int:
+    raise ValueError(f'{path} holds no count of trials: correct or remove it')

@@ -1,0 +1,414 @@
+"""The border fails closed: nothing unsafe passes, and what is missing holds the head."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from ja_common.core.health import Level
+from ja_control.core.border import Border, BorderConfig, Cause
+from ja_control.core.joint_limits import JointLimitsConfig
+
+PERIOD_S = 0.01
+LIMITS = JointLimitsConfig(
+    pan_min_rad=-1.0,
+    pan_max_rad=0.8,
+    tilt_min_rad=-0.5,
+    tilt_max_rad=0.4,
+    soft_margin_rad=0.02,
+    max_speed_rad_s=2.0,
+    max_acceleration_rad_s2=40.0,
+)
+CONFIG = BorderConfig(
+    dead_zone_rad=0.005,
+    stale_after_s=0.5,
+    silent_after_s=0.1,
+    stall_error_rad=0.1,
+    stall_after_s=0.3,
+    retry_after_s=1.0,
+    outside_rad=0.3,
+)
+
+
+class Rig:
+    """A border, images every third period, and a head that follows its command at once."""
+
+    def __init__(self, posture=(0.0, 0.0), **config):
+        self.border = Border(LIMITS, replace(CONFIG, **config), PERIOD_S)
+        self.now_s = 100.0
+        self.posture = np.array(posture)
+        self.images = self.joints = True
+        self.follows = True
+        self.image_age_s = self.joints_age_s = 0.02
+        self._tick = 0
+
+    def run(self, seconds, aim=None):
+        """[Command] of every period."""
+        commands = []
+        for _ in range(round(seconds / PERIOD_S)):
+            self.now_s += PERIOD_S
+            if self.joints:
+                self.border.hear_joints(self.posture, self.now_s, self.joints_age_s)
+            if self.images and self._tick % 3 == 0:
+                self.border.hear_image(self.now_s, self.image_age_s)
+                if aim is not None and self.border.engaged:
+                    self.border.aim(aim)
+            self._tick += 1
+            command = self.border.step(self.now_s)
+            if self.follows and command.position is not None:
+                self.posture = command.position
+            commands.append(command)
+        return commands
+
+
+def causes(commands):
+    """The causes of holds in the order in which they came, each run once; None while moving."""
+    found = [None if c.hold is None else c.hold.cause for c in commands]
+    return [c for i, c in enumerate(found) if i == 0 or c is not found[i - 1]]
+
+
+def stopped_after_s(commands):
+    """Time until the command stood still for good."""
+    moving = [i for i, c in enumerate(commands) if c.velocity.any()]
+    return (moving[-1] + 2) * PERIOD_S if moving else 0.0
+
+
+def test_head_begins_where_it_stands_and_takes_its_aim():
+    rig = Rig(posture=(0.3, -0.1))
+    commands = rig.run(0.6, aim=(-0.4, 0.2))
+    assert commands[0].position == pytest.approx((0.3, -0.1))
+    assert commands[-1].position == pytest.approx((-0.4, 0.2))
+    assert causes(commands) == [None]
+
+
+def test_nothing_is_sent_before_joint_states_and_an_image_have_come():
+    for missing in ('joints', 'images'):
+        rig = Rig()
+        setattr(rig, missing, False)
+        assert all(c.position is None and c.hold.cause is Cause.WAITING for c in rig.run(0.05))
+        setattr(rig, missing, True)
+        assert rig.run(0.05)[-1].hold is None
+
+
+@pytest.mark.parametrize('bad', [(math.nan, 0.0), (0.0, math.inf), (0.0,)])
+def test_what_is_not_finite_is_refused_and_changes_nothing(bad):
+    rig = Rig()
+    rig.run(0.3, aim=(0.2, 0.1))
+    with pytest.raises(ValueError, match='target posture must be two finite angles'):
+        rig.border.aim(bad)
+    with pytest.raises(ValueError, match='measured posture must be two finite angles'):
+        rig.border.hear_joints(bad, rig.now_s, 0.0)
+    assert rig.run(0.05)[-1].position == pytest.approx((0.2, 0.1))
+
+
+def test_aim_within_the_dead_zone_is_the_last_one_joint_by_joint():
+    rig = Rig()
+    rig.run(0.5, aim=(0.3, 0.1))
+    assert rig.run(0.3, aim=(0.304, 0.2))[-1].position == pytest.approx((0.3, 0.2))
+
+
+def test_aim_outside_ends_at_the_soft_margin_and_says_so():
+    command = Rig().run(1.5, aim=(3.0, -3.0))[-1]
+    assert command.position == pytest.approx((0.78, -0.48))
+    assert command.clamped == 'position'
+
+
+def test_cut_by_speed_and_acceleration_is_told():
+    commands = Rig().run(0.5, aim=(0.7, 0.0))
+    assert {'acceleration', 'speed', ''} <= {c.clamped for c in commands}
+
+
+@pytest.mark.parametrize(
+    ('fail', 'cause'),
+    [
+        (dict(images=False), Cause.SILENT),
+        (dict(image_age_s=0.6), Cause.STALE_IMAGE),
+        (dict(image_age_s=-0.6), Cause.STALE_IMAGE),
+        (dict(joints_age_s=0.6), Cause.STALE_JOINTS),
+        (dict(joints_age_s=-0.6), Cause.STALE_JOINTS),
+    ],
+)
+def test_missing_or_stale_input_stops_the_head_and_its_return_moves_it_again(fail, cause):
+    rig = Rig()
+    before = {name: getattr(rig, name) for name in fail}
+    moving = rig.run(0.25, aim=(0.7, 0.0))
+    assert moving[-1].velocity[0] == pytest.approx(2.0)
+    vars(rig).update(fail)
+    stopping = rig.run(0.4, aim=(0.7, 0.0))
+    assert stopped_after_s(stopping) <= CONFIG.silent_after_s + 2.0 / 40.0 + 3 * PERIOD_S
+    assert stopping[-1].hold.cause is cause
+    assert stopping[-1].hold.level is Level.WARN
+    vars(rig).update(before)
+    assert rig.run(0.5, aim=(0.7, 0.0))[-1].position == pytest.approx((0.7, 0.0))
+
+
+def test_joint_states_that_stop_make_the_head_stop():
+    rig = Rig()
+    rig.run(0.1, aim=(0.7, 0.0))
+    rig.joints = False
+    assert causes(rig.run(1.0, aim=(0.7, 0.0)))[-1] is Cause.STALE_JOINTS
+
+
+def test_after_a_hold_the_command_begins_at_the_measured_posture():
+    rig = Rig()
+    rig.run(0.5, aim=(0.5, 0.0))
+    rig.border.enable(False)
+    held = rig.run(0.2)
+    assert held[-1].hold.text == 'disabled'
+    rig.follows, rig.posture = False, np.array([-0.2, 0.1])  # turned by hand
+    assert rig.run(0.2)[-1].position == pytest.approx((0.5, 0.0)), 'no chase of a turned head'
+    rig.border.enable(True)
+    rig.follows = True
+    again = rig.run(0.03)
+    assert again[0].position == pytest.approx((-0.2, 0.1))
+
+
+def test_disabling_brakes_it_does_not_jerk():
+    rig = Rig()
+    rig.run(0.2, aim=(0.7, 0.0))
+    rig.border.enable(False)
+    velocities = [c.velocity[0] for c in rig.run(0.1)]
+    assert np.diff(velocities).min() >= -40.0 * PERIOD_S - 1e-9
+    assert velocities[-1] == 0.0
+
+
+def test_joint_that_does_not_follow_is_a_stall_and_is_tried_again():
+    rig = Rig()
+    rig.follows = False
+    commands = rig.run(0.8, aim=(0.5, 0.0))
+    stalled = next(i for i, c in enumerate(commands) if c.hold)
+    assert stalled * PERIOD_S == pytest.approx(CONFIG.stall_after_s + 0.1, abs=0.1)
+    assert commands[stalled].hold.cause is Cause.STALLED
+    assert commands[stalled].hold.level is Level.ERROR
+    assert commands[-1].position == pytest.approx((0.0, 0.0)), 'no pushing against what blocks it'
+    rig.follows = True
+    assert rig.run(2.0, aim=(0.5, 0.0))[-1].position == pytest.approx((0.5, 0.0))
+
+
+def test_slow_joint_is_no_stall():
+    rig = Rig()
+    rig.follows = False
+    for _ in range(400):
+        command = rig.run(PERIOD_S, aim=(0.7, 0.0))[-1]
+        rig.posture = rig.posture + np.clip(command.position - rig.posture, -0.0015, 0.0015)
+        assert command.hold is None
+
+
+def test_noise_of_the_encoders_does_not_hide_a_stall():
+    rig = Rig()
+    rig.follows = False
+    rng = np.random.default_rng(0)
+    seen = set()
+    for _ in range(80):
+        rig.posture = rng.normal(0.0, 0.003, 2)
+        seen |= {c.hold.cause for c in rig.run(PERIOD_S, aim=(0.5, 0.0)) if c.hold}
+    assert seen == {Cause.STALLED}
+
+
+def test_latched_fault_waits_for_enable():
+    rig = Rig(latch_faults=True)
+    rig.run(0.2, aim=(0.5, 0.0))
+    rig.images = False
+    rig.run(0.3)
+    rig.images = True
+    held = rig.run(0.5, aim=(0.5, 0.0))[-1]
+    assert held.hold.cause is Cause.SILENT
+    assert 'latched until enable is called' in held.hold.text
+    rig.border.enable(True)
+    assert rig.run(0.5, aim=(0.5, 0.0))[-1].position == pytest.approx((0.5, 0.0))
+
+
+def test_drooping_head_is_brought_back_in_gently_and_never_farther_out():
+    rig = Rig(posture=(0.0, 0.6))
+    tilts = [c.position[1] for c in rig.run(0.5)]
+    assert tilts[0] == pytest.approx(0.6, abs=0.01)
+    assert max(tilts) <= 0.6
+    assert tilts[-1] == pytest.approx(0.38)
+
+
+def test_head_far_outside_is_not_moved():
+    rig = Rig(posture=(1.4, 0.0))
+    command = rig.run(0.2, aim=(0.0, 0.0))[-1]
+    assert command.position is None
+    assert command.hold.cause is Cause.OUTSIDE
+    assert command.hold.level is Level.ERROR
+    rig.posture = np.array([0.5, 0.0])
+    assert rig.run(0.4, aim=(0.0, 0.0))[-1].position == pytest.approx((0.0, 0.0))
+
+
+def test_clock_that_runs_back_voids_what_was_heard():
+    rig = Rig()
+    rig.run(0.2, aim=(0.7, 0.0))
+    rig.now_s -= 50.0
+    rig.images = rig.joints = False
+    commands = rig.run(0.2)
+    assert stopped_after_s(commands) <= 0.06
+    assert commands[-1].hold.cause is Cause.WAITING
+
+
+def test_new_limits_wait_until_the_old_ones_have_stopped_the_head():
+    rig = Rig()
+    rig.run(0.2, aim=(0.7, 0.0))
+    rig.border.set_limits(replace(LIMITS, max_acceleration_rad_s2=1.0, pan_max_rad=0.1))
+    commands = rig.run(3.0, aim=(0.7, 0.0))
+    velocities = [c.velocity[0] for c in commands]
+    assert min(np.diff(velocities[:6])) == pytest.approx(-0.4), 'braked by the old limit'
+    assert np.abs(np.diff(velocities[6:])).max() <= 1.0 * PERIOD_S + 1e-9
+    assert commands[-1].position[0] == pytest.approx(0.08)
+
+
+# What may happen to a border, as actions on it and on the world around it.
+anything = st.floats(allow_nan=True, allow_infinity=True)
+angle = st.one_of(st.floats(-2.0, 2.0), anything)
+pair = st.tuples(angle, angle)
+seconds = st.one_of(st.floats(-1.0, 1.0), anything)
+sound = st.tuples(st.just('sound'), st.tuples(st.floats(-2, 2), st.floats(-2, 2)))
+action = st.one_of(
+    sound, sound, sound, sound,
+    st.tuples(st.just('aim'), pair),
+    st.tuples(st.just('joints'), pair, seconds),
+    st.tuples(st.just('image'), seconds),
+    st.tuples(st.just('steps'), st.integers(1, 12)),
+    st.tuples(st.just('clock'), st.floats(-5.0, 5.0)),
+    st.tuples(st.just('enable'), st.booleans()),
+    st.tuples(st.just('anew')),
+    st.tuples(st.just('block'), st.sampled_from(['', 'waiting'])),
+    st.tuples(
+        st.just('limits'), st.floats(0.1, 4.0), st.floats(1.0, 100.0), st.floats(0.3, 1.5)
+    ),
+)  # fmt: skip
+
+
+class Watch:
+    """Follows the commands of a border with an eye on every limit."""
+
+    def __init__(self):
+        self.border = Border(LIMITS, replace(CONFIG, stall_after_s=0.06), PERIOD_S)
+        self.now_s = 0.0
+        self.measured = None
+        self.previous = None
+        self.limits = [LIMITS]
+
+    def do(self, what, *arguments):
+        getattr(self, f'_{what}')(*arguments)
+
+    def _aim(self, target):
+        self._try(self.border.aim, target)
+
+    def _joints(self, posture, age_s):
+        if self._try(self.border.hear_joints, posture, self.now_s, age_s):
+            self.measured = np.array(posture)
+
+    def _image(self, age_s):
+        self.border.hear_image(self.now_s, age_s)
+
+    def _sound(self, target):
+        """A while in which nothing is amiss: the head follows, and images come."""
+        self.border.enable(True)
+        self.border.blocked = ''
+        for _ in range(3):
+            if self.previous is not None and self.previous.position is not None:
+                self._joints(tuple(self.previous.position), 0.0)
+            elif self.measured is None:
+                self._joints((0.1, 0.0), 0.0)
+            self._image(0.0)
+            if self.border.engaged:
+                self._aim(target)
+            self._steps(3)
+
+    def _clock(self, seconds):
+        self.now_s += seconds
+
+    def _enable(self, enabled):
+        self.border.enable(enabled)
+
+    def _anew(self):
+        self.border.begin_anew()
+
+    def _block(self, text):
+        self.border.blocked = text
+
+    def _limits(self, speed, acceleration, room):
+        changed = replace(
+            LIMITS,
+            max_speed_rad_s=speed,
+            max_acceleration_rad_s2=acceleration,
+            pan_min_rad=-room,
+            pan_max_rad=room,
+        )
+        self.border.set_limits(changed)
+        self.limits.append(changed)
+
+    def _steps(self, count):
+        for _ in range(count):
+            self.now_s += PERIOD_S
+            self.judge(self.border.step(self.now_s))
+
+    def _try(self, function, *arguments):
+        try:
+            function(*arguments)
+        except ValueError:
+            return False
+        return True
+
+    def judge(self, command):
+        position = command.position
+        before, self.previous = self.previous, command
+        if position is None:
+            assert command.hold is not None
+            return
+        assert np.isfinite(position).all()
+        # Whatever limits have been in force of late: those of now or those that brake.
+        speed = max(limits.max_speed_rad_s for limits in self.limits)
+        step = PERIOD_S * max(limits.max_acceleration_rad_s2 for limits in self.limits)
+        low = [min(limits.pan_min_rad for limits in self.limits), LIMITS.tilt_min_rad]
+        high = [max(limits.pan_max_rad for limits in self.limits), LIMITS.tilt_max_rad]
+        assert np.all(np.abs(command.velocity) <= speed + 1e-9)
+        outside = np.maximum(np.maximum(low - position, position - high), 0.0)
+        assert np.all(outside <= CONFIG.outside_rad + 1e-9)
+        began = before is None or before.position is None or (
+            not before.velocity.any()
+            and not np.allclose(position, before.position + command.velocity * PERIOD_S, atol=1e-9)
+        )  # fmt: skip
+        if began:
+            # Only at rest, and only to where the head was measured.
+            assert np.all(np.abs(command.velocity) <= step + 1e-9)
+            assert position == pytest.approx(
+                self.measured + command.velocity * PERIOD_S, abs=1e-9
+            )
+            assert command.hold is None
+            return
+        assert position == pytest.approx(before.position + command.velocity * PERIOD_S, abs=1e-9)
+        assert np.all(np.abs(command.velocity - before.velocity) <= step + 1e-9)
+        was = np.maximum(np.maximum(low - before.position, before.position - high), 0.0)
+        assert np.all(outside <= was + 1e-9), 'never farther out than it was'
+        if command.hold is not None and command.hold.cause is not Cause.STALLED:
+            assert np.all(np.abs(command.velocity) <= np.abs(before.velocity)), 'a hold brakes'
+
+
+def any_history(actions):
+    watch = Watch()
+    for each in actions:
+        watch.do(*each)
+        watch.do('steps', 1)
+
+
+histories = st.lists(action, max_size=40)
+
+
+@settings(max_examples=300, deadline=None)
+@given(histories)
+def test_no_history_of_inputs_leaves_a_limit(actions):
+    any_history(actions)
+
+
+@pytest.mark.slow
+@settings(
+    max_examples=100_000, deadline=None, suppress_health_check=list(HealthCheck), database=None
+)
+@given(histories)
+def test_no_history_of_inputs_leaves_a_limit_in_a_hundred_thousand(actions):
+    any_history(actions)

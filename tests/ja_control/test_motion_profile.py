@@ -1,0 +1,66 @@
+"""The trapezoid: as fast as the limits allow, to the aim, and never past it."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ja_control.core.motion_profile import MotionProfile, stopping_speed
+
+PERIOD_S, SPEED, ACCELERATION = 0.01, 2.0, 40.0
+
+
+def run(profile, aim, periods):
+    """Positions and velocities over so many periods, each (periods,)."""
+    states = []
+    for _ in range(periods):
+        profile.approach(aim)
+        states.append((profile.position, profile.velocity))
+    return np.array(states).T
+
+
+@given(st.floats(1e-6, 10.0), st.floats(1e-3, 5.0), st.floats(1e-3, 0.1))
+def test_braking_from_the_stopping_speed_ends_exactly_at_the_distance(distance, step, period_s):
+    velocity, way = stopping_speed(distance, step, period_s), 0.0
+    while velocity > 0.0:
+        way += velocity * period_s
+        velocity -= step
+    assert way == pytest.approx(distance)
+
+
+def test_it_takes_the_time_of_a_trapezoid_and_stands_on_the_aim():
+    positions, velocities = run(MotionProfile(PERIOD_S, SPEED, ACCELERATION), 1.0, 80)
+    ideal_s = 1.0 / SPEED + SPEED / ACCELERATION
+    arrived = np.flatnonzero(np.isclose(positions, 1.0, atol=1e-12))[0]
+    assert (arrived + 1) * PERIOD_S == pytest.approx(ideal_s, abs=2 * PERIOD_S)
+    assert positions.max() <= 1.0 + 1e-12
+    assert velocities.max() == SPEED
+    assert np.abs(np.diff(velocities)).max() <= ACCELERATION * PERIOD_S + 1e-12
+    assert velocities[-1] == 0.0
+
+
+def test_it_names_the_limit_that_cut_it():
+    profile = MotionProfile(PERIOD_S, SPEED, ACCELERATION)
+    said = [profile.approach(1.0) for _ in range(80)]
+    assert said[0] == 'acceleration'
+    assert said[20] == 'speed'
+    assert said[-1] == ''
+
+
+def test_aim_that_jumps_back_is_passed_and_returned_to():
+    profile = MotionProfile(PERIOD_S, SPEED, ACCELERATION)
+    run(profile, 1.0, 20)
+    here, speed = profile.position, profile.velocity
+    positions, velocities = run(profile, here, 60)
+    assert positions.max() - here == pytest.approx(speed**2 / 2 / ACCELERATION, abs=0.02)
+    assert positions[-1] == pytest.approx(here)
+    assert np.abs(np.diff(velocities)).max() <= ACCELERATION * PERIOD_S + 1e-12
+
+
+def test_braking_stops_within_the_acceleration():
+    profile = MotionProfile(PERIOD_S, SPEED, ACCELERATION)
+    run(profile, 1.0, 20)
+    for _ in range(round(SPEED / ACCELERATION / PERIOD_S)):
+        assert profile.velocity > 0.0
+        profile.brake()
+    assert profile.velocity == 0.0
