@@ -1,0 +1,21 @@
+"""The count of trials in a file: whole or not at all, and never guessed."""
+
+import pytest
+
+from ja_control.core.trial_count import load_trials, save_trials
+
+
+def test_what_was_saved_is_loaded(tmp_path):
+    path = tmp_path / 'trials'
+    assert load_trials(path) == 0
+    save_trials(path, 120_000)
+    assert load_trials(path) == 120_000
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize('content', [b'', b'many', b'-3', b'\xff\x00'])
+def test_what_is_no_count_is_refused(tmp_path, content):
+    path = tmp_path / 'trials'
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match='holds no count of trials'):
+        load_trials(path)
