@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-from ja_bringup.graph import rig_graph, sim_graph, split_ros_arguments, with_arguments
+from ja_bringup.graph import (
+    RECORDER,
+    rig_graph,
+    sim_graph,
+    split_ros_arguments,
+    with_arguments,
+)
+from ja_bringup.recording.cli import register as register_recording
 from ja_common.core.config import ConfigError
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_experiments.cli import register as register_experiments
@@ -39,6 +46,7 @@ PRACTICE_TRIALS = {'gaze_line': 300, 'paper': 1500}
 
 OnDeathOption = Annotated[OnDeathChoice, typer.Option(help='What to do when a node dies.')]
 OneProcess = Annotated[bool, typer.Option('--one-process', help='All nodes in one process.')]
+Record = Annotated[bool, typer.Option('--record', help='Record all topics into runs/.')]
 TimeOption = Annotated[float, typer.Option('--time', min=0.0, help='End after so many seconds.')]
 
 
@@ -65,6 +73,7 @@ def demo(
     ] = 100,
     seed: Annotated[int, typer.Option(min=0, help='Seed of the world and of the robot.')] = 0,
     scene: Annotated[str, typer.Option(help='Scene of the sim, by name or file.')] = 'easy',
+    record: Record = False,
     one_process: OneProcess = False,
     on_death: OnDeathOption = OnDeathChoice.stop,
 ) -> None:
@@ -74,7 +83,7 @@ def demo(
 
     graph = sim_graph(seed, {'scene': scene}, learner.value)
     stages = standard_course(trials or PRACTICE_TRIALS[learner.value], time_s, exam_trials)
-    graph = with_arguments(graph, context.obj or [])
+    graph = with_arguments([*[RECORDER] * record, *graph], context.obj or [])
     sys.exit(run_demo(graph, stages, one_process, on_death.value, context.obj or []))
 
 
@@ -89,6 +98,7 @@ def rig(
         ),
     ] = None,
     time_s: TimeOption = 0.0,
+    record: Record = False,
     one_process: OneProcess = False,
     on_death: OnDeathOption = OnDeathChoice.stop,
 ) -> None:
@@ -97,7 +107,7 @@ def rig(
 
     arguments = context.obj or []
     code, _ = run_graph(
-        with_arguments(rig_graph(source), arguments),
+        with_arguments([*[RECORDER] * record, *rig_graph(source)], arguments),
         new_run_folder('rig'),
         'Joint attention, on real pictures',
         lambda node: 0.0 < time_s < node.elapsed_s,
@@ -133,6 +143,7 @@ def reference(
 
 
 register_experiments(app)
+register_recording(app)
 
 
 def main() -> None:

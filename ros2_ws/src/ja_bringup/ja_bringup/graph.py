@@ -57,6 +57,10 @@ class NodeSpec:
         return getattr(importlib.import_module(self.module), self.class_name)
 
 
+RECORDER = NodeSpec('ja_bringup', 'recorder')
+"""Stands first in a graph that is recorded, so that it misses nothing."""
+
+
 def split_ros_arguments(argv: Sequence[str]) -> tuple[list[str], list[str]]:
     """Command line -> (ours, ROS's without `--ros-args`); ROS's end at `--` or at the end."""
     ours: list[str] = []

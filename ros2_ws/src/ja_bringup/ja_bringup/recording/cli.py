@@ -1,0 +1,72 @@
+"""The commands `record` and `replay`, for `./ja`."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to an app."""
+    app.command()(record)
+    app.command()(replay)
+
+
+def record(
+    context: typer.Context,
+    output: Annotated[
+        Path | None, typer.Option(help='Folder of the recording; runs/<time>-record without it.')
+    ] = None,
+    exclude: Annotated[
+        str, typer.Option(help='Regular expression: topics that it matches are left out.')
+    ] = 'image_annotated',
+    time_s: Annotated[
+        float, typer.Option('--time', min=0.0, help='End after so many seconds; 0: no end.')
+    ] = 0.0,
+    keep_mb: Annotated[
+        float, typer.Option(min=0.0, help='Drop the oldest files beyond so many MB; 0: keep all.')
+    ] = 4000.0,
+    keep_s: Annotated[
+        float, typer.Option(min=0.0, help='Drop files older than so many seconds; 0: keep all.')
+    ] = 0.0,
+) -> None:
+    """Record every topic of the running graph, whatever its type, as MCAP.
+
+    Examples: `./ja record`; `./ja record --exclude 'image|rosout' --time 60`; bounded to the last
+    hour: `./ja record --keep-s 3600 --ros-args -p split_s:=60.0`.
+    """
+    from ja_bringup.recording.alone import record as run
+
+    parameters = {
+        'folder': '' if output is None else str(output),
+        'exclude': exclude,
+        'keep_mb': keep_mb,
+        'keep_s': keep_s,
+    }
+    sys.exit(run(parameters, time_s, context.obj or []))
+
+
+def replay(
+    context: typer.Context,
+    recording: Annotated[Path, typer.Argument(help='A .mcap file, or a folder of them.')],
+    speed: Annotated[
+        float, typer.Option(min=0.001, max=1000.0, help='Recorded seconds a second.')
+    ] = 1.0,
+    without: Annotated[
+        list[str] | None, typer.Option(help='A topic to leave out; may be given several times.')
+    ] = None,
+) -> None:
+    """Publish a recording again, with /clock, for a node to be tried on it.
+
+    Examples: `./ja replay runs/X-record --speed 2`; another detector on the recorded pictures:
+    `./ja replay runs/X-record --without detections --without face_image`.
+    """
+    from ja_bringup.recording.alone import replay as run
+
+    parameters = {
+        'recording': str(recording),
+        'speed': speed,
+        'without': ','.join(without or ()),
+    }
+    sys.exit(run(parameters, context.obj or []))
