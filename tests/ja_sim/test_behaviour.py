@@ -81,6 +81,18 @@ def test_left_alone_she_attends_for_a_while_only():
     assert caregiver.attends_to(5.1) == ROBOT
 
 
+def test_her_eyes_miss_by_their_deviation_and_not_at_all_without_it():
+    caregiver, errors = behaviour(gaze_noise_deg=2.0), []
+    for trial in range(400):
+        caregiver.update(trial, AWAY, STILL, 3)
+        caregiver.update(trial + 0.5, ON_HER, STILL, 3)
+        errors.append(caregiver.look.gaze_error_rad)
+    np.testing.assert_allclose(np.degrees(np.std(errors, axis=0)), [2.0, 2.0], rtol=0.15)
+    exact = behaviour(gaze_noise_deg=0.0)
+    exact.update(0.0, ON_HER, STILL, 3)
+    assert exact.look.gaze_error_rad == (0.0, 0.0)
+
+
 def test_reliability_is_the_share_of_looks_that_go_where_she_attends():
     caregiver = behaviour(reliability=0.7)
     reliable = []

@@ -20,6 +20,7 @@ from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.box import Box
 from ja_perception.core.face_crop import crop_face
 from ja_sim.core.caregiver import identities
+from ja_sim.core.gaze import missed
 from ja_sim.core.objects import Arrangement
 from ja_sim.core.scene import Scene, load_scene
 from ja_sim.core.specs import HEAD_PRESETS
@@ -92,9 +93,10 @@ def head_pose(looks_per_person: int = 250) -> dict[str, Row]:
     }
 
 
-def ceiling(trials: int = 2000) -> dict[str, Row]:
-    """Success of who knows her gaze exactly, but not how far along it the object is.
+def ceiling(trials: int = 8000) -> dict[str, Row]:
+    """Success of who sees exactly where her eyes point, but not how far along it the object is.
 
+    Her eyes miss what she looks at by a little, as the scene says.
     Either by asking of every object how near it is to the line of gaze, or, as a network with one
     pair of outputs must, by turning the gaze into the most likely direction first.
     """
@@ -105,12 +107,13 @@ def ceiling(trials: int = 2000) -> dict[str, Row]:
         # She attends to the first of each row; the order of drawing means nothing.
         positions = _arrangements(scene, trials)
         directions = directions_of_vectors(positions)
-        lines = directions_of_vectors(_along_gaze(scene, positions[:, 0]))
+        looked_at = _looked_at(scene, positions[:, 0])
+        lines = directions_of_vectors(_along_gaze(scene, looked_at))
         off_line = angle_between(lines[:, None], directions[:, :, None]).min(axis=2)
         rows[f'ceiling, {count} objects, nearest to the line of gaze'] = _share(
             off_line.argmin(axis=1) == 0
         )
-        guess = _one_guess(directions_of_vectors(_face(scene) - positions[:, 0]), directions[:, 0])
+        guess = _one_guess(directions_of_vectors(_face(scene) - looked_at), directions[:, 0])
         off_guess = angle_between(guess[:, None], directions)
         rows[f'ceiling, {count} objects, nearest to one guess'] = _share(
             off_guess.argmin(axis=1) == 0
@@ -252,6 +255,13 @@ def _arrangements(scene: Scene, trials: int) -> np.ndarray:
         arrangement.rearrange()
         places.append([thing.position for thing in arrangement.things])
     return np.array(places)
+
+
+def _looked_at(scene: Scene, attended: np.ndarray) -> np.ndarray:
+    """Where her eyes point (T, 3) [m] when she attends to things at (T, 3) [m]."""
+    rng, deviation = np.random.default_rng(1), np.radians(scene.caregiver.gaze_noise_deg)
+    eyes = np.broadcast_to(_face(scene), (2, 3))
+    return np.array([missed(each, eyes, rng.normal(0.0, deviation, 2)) for each in attended])
 
 
 def _one_guess(gaze: np.ndarray, directions: np.ndarray) -> np.ndarray:

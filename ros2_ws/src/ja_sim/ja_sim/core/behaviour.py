@@ -25,12 +25,14 @@ class Look:
     """What one look of the robot at her made her do.
 
     ``attended`` is the index of the object she means; ``reliable`` is False when her gaze goes
-    elsewhere; ``head_share`` is the part of the gaze angle that her head takes, her eyes the rest.
+    elsewhere; ``gaze_error_rad`` (pan, tilt) is how far her eyes miss what they look at;
+    ``head_share`` is the part of the gaze angle that her head takes, her eyes the rest.
     """
 
     trial: int
     attended: int
     reliable: bool
+    gaze_error_rad: tuple[float, float]
     head_share: float
     head_noise_rad: tuple[float, float]
 
@@ -60,7 +62,7 @@ class CaregiverBehaviour:
     def __init__(self, spec: CaregiverSpec, rng: np.random.Generator) -> None:
         self._spec = spec
         self._rng = rng
-        self.look = Look(0, ROBOT, True, 1.0, (0.0, 0.0))
+        self.look = Look(0, ROBOT, True, (0.0, 0.0), 1.0, (0.0, 0.0))
         self._started_s = -math.inf  # when the present trial began
         self._armed = True  # the robot has looked elsewhere since the last look
         self._robot_stayed = True  # it has not left her since the trial began
@@ -99,11 +101,15 @@ class CaregiverBehaviour:
         """Another object than before, and how she will turn to it."""
         rng, spec = self._rng, self._spec
         others = [index for index in range(objects) if index != self.look.attended]
-        noise = rng.normal(0.0, math.radians(spec.head_noise_deg), 2)
         return Look(
             trial=self.look.trial + 1,
             attended=int(rng.choice(others or [0])),
             reliable=bool(rng.random() < spec.reliability),
+            gaze_error_rad=self._error(spec.gaze_noise_deg),
             head_share=float(rng.uniform(*spec.head_share)),
-            head_noise_rad=(float(noise[0]), float(noise[1])),
+            head_noise_rad=self._error(spec.head_noise_deg),
         )
+
+    def _error(self, deviation_deg: float) -> tuple[float, float]:
+        pan, tilt = self._rng.normal(0.0, math.radians(deviation_deg), 2)
+        return float(pan), float(tilt)

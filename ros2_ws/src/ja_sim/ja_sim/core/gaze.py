@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ja_common.core.geometry import directions_of_vectors, head_rotation
+from ja_common.core.geometry import directions_of_vectors, head_rotation, vectors_of_directions
 
 EYE_RANGE_RAD = np.radians([40.0, 30.0])  # how far eyes turn in the head: sideways, up and down
 HEAD_RANGE_RAD = np.radians([80.0, 50.0])
@@ -28,6 +28,14 @@ class GazePose:
 
     head: np.ndarray
     eyes: np.ndarray
+
+
+def missed(target: np.ndarray, eyes: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """The point (3,) beside ``target`` at which eyes look that miss it by ``error`` (2,) [rad]."""
+    centre = eyes.mean(axis=0)
+    line = target - centre
+    landed = vectors_of_directions(directions_of_vectors(line) + error)
+    return centre + np.linalg.norm(line) * landed
 
 
 def head_angles(target: np.ndarray, eyes: np.ndarray, share: float) -> np.ndarray:

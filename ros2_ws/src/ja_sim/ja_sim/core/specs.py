@@ -121,6 +121,12 @@ class CaregiverSpec(Checked):
     head_noise_deg: float = parameter(
         1.0, "Standard deviation of her head's angles", low=0.0, high=15.0
     )
+    gaze_noise_deg: float = parameter(
+        0.7,
+        'Standard deviation, in pan and in tilt, of how far her eyes miss what she looks at',
+        low=0.0,
+        high=15.0,
+    )
     reliability: float = parameter(
         1.0, 'Share of looks that go where she attends; others go anywhere', low=0.0, high=1.0
     )

@@ -23,7 +23,7 @@ from ja_common.core.geometry import (
 from ja_sim.core.behaviour import ROBOT, Blinking, CaregiverBehaviour
 from ja_sim.core.camera import Intrinsics, Observation, expose
 from ja_sim.core.caregiver import CaregiverBodies, draw_appearance
-from ja_sim.core.gaze import GazePose, GazeShift
+from ja_sim.core.gaze import GazePose, GazeShift, missed
 from ja_sim.core.head import JointSample, PanTiltHead
 from ja_sim.core.light import Lighting
 from ja_sim.core.objects import Arrangement, ObjectBodies, Thing
@@ -249,9 +249,8 @@ class JointAttentionWorld:
         share, noise = behaviour.look.head_share, np.array(behaviour.look.head_noise_rad)
         if self._attended == ROBOT:
             share, noise = 1.0, np.zeros(2)
-        target = self._caregiver.to_rest_frame(self._gaze_point())
         start_s = self._time_s + spec.reaction_s
-        self._gaze.start(start_s, spec.turn_s, target, share, noise)
+        self._gaze.start(start_s, spec.turn_s, self._target_now(), share, noise)
         self._turned_s = start_s + spec.turn_s
 
     def _gaze_point(self) -> np.ndarray:
@@ -263,7 +262,11 @@ class JointAttentionWorld:
         return self._positions()[self._attended]
 
     def _target_now(self) -> np.ndarray:
-        return self._caregiver.to_rest_frame(self._gaze_point())
+        """Where her eyes point, (3,) [m] in the rest frame: not quite at what she means."""
+        target = self._caregiver.to_rest_frame(self._gaze_point())
+        if self._attended == ROBOT:
+            return target
+        return missed(target, self._caregiver.eyes, np.array(self._behaviour.look.gaze_error_rad))
 
     def _positions(self) -> np.ndarray:
         """Where the objects are now, (N, 3) [m]."""
