@@ -190,7 +190,8 @@ class GateNode(GraphNode):
         self._decision = self._decide(proposals, posture)
         if lockstep:
             seconds = min(max(step_s, 0.0), _LONGEST_STEP_S)
-            self._step(now_s, max(1, round(seconds * self._config.control_rate_hz)))
+            # Not the newest posture: which one that is depends on the scheduling.
+            self._step(now_s, posture, max(1, round(seconds * self._config.control_rate_hz)))
 
     def _decide(self, proposals: dict[str, Any], posture: Posture) -> Decision | None:
         if not self._border.engaged:
@@ -222,19 +223,18 @@ class GateNode(GraphNode):
 
     def _on_period(self) -> None:
         try:
-            self._step(self._now_s(), 1)
+            self._step(self._now_s(), self._postures.newest, 1)
         except ValueError as error:
             self.problem('control', f'control: {error}')
 
-    def _step(self, now_s: float, periods: int) -> None:
-        newest = self._postures.newest
-        if newest is not None:
-            self._border.hear_joints(newest.position, now_s, self._age_s(newest.stamp_ns))
+    def _step(self, now_s: float, measured: Posture | None, periods: int) -> None:
+        if measured is not None:
+            self._border.hear_joints(measured.position, now_s, self._age_s(measured.stamp_ns))
         command = self._border.step(now_s, periods)
         news = self._note_hold(command.hold)
-        if self._config.lockstep and command.position is None and newest is not None:
+        if self._config.lockstep and command.position is None and measured is not None:
             # The sim waits for an answer even of a gate that may not move.
-            command = replace(command, position=newest.position)
+            command = replace(command, position=measured.position)
         if command.position is not None:
             self._publish(command)
         due = self._config.lockstep or now_s - self._told_s >= _STATUS_EVERY_S
