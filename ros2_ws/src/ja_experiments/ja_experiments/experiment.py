@@ -177,7 +177,7 @@ def run_seed(
         explained.append([_explained(experiment, looks) for looks in tested.values()])
         for stage in _stages_after(block):
             alone[stage] = {
-                name: experiment.test(test_config, looks, plan.test_trials, _TEST_SEED)
+                name: experiment.test(test_config, looks, plan.test_trials, _TEST_SEED + seed)
                 for name, looks in tested.items()
             }
         progress(plan.block)

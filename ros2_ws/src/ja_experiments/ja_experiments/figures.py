@@ -146,7 +146,7 @@ def ablation_bars(variants: Mapping[str, Condition], title: str) -> Figure:
     axes.set_xlabel('success at the end (mean and 95 % interval over seeds)')
     axes.set_title(title, fontsize=10)
     _clean(axes)
-    axes.legend(frameon=False, fontsize=8, loc='lower center', bbox_to_anchor=(0.4, 1.08), ncols=3)
+    figure.legend(frameon=False, fontsize=8, loc='outside upper center', ncols=3)
     return figure
 
 
@@ -174,7 +174,8 @@ def frozen_stages(conditions: Mapping[str, Condition]) -> Figure:
         axes.set(title=f'pairs: {name}', ylim=(0, 1.02))
         _clean(axes)
     panels[0].set_ylabel('success, learner alone')
-    panels[0].legend(frameon=False, fontsize=8, loc='upper left')
+    handles = panels[0].get_legend_handles_labels()
+    figure.legend(*handles, frameon=False, fontsize=8, loc='outside lower center', ncols=4)
     return figure
 
 

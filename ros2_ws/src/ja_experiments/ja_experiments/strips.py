@@ -148,9 +148,9 @@ def _draw(axes: Axes, sight: Sight, face: np.ndarray | None, config: ExperimentC
     axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
     camera, truth = sight.camera, sight.truth
     radius = np.tan(config.evaluator.d_th_rad) * camera.fx
-    axes.add_patch(
-        Circle((camera.cx, camera.cy), radius, fill=False, color='white', linewidth=1.2)
-    )
+    for colour, thickness in (('black', 2.4), ('white', 1.2)):
+        middle = (camera.cx, camera.cy)
+        axes.add_patch(Circle(middle, radius, fill=False, color=colour, linewidth=thickness))
     ray = rays_of_directions(sight.posture.position, truth.directions[truth.attended])
     u, v = camera.pixels(ray)
     axes.plot(u, v, '+', color='white', markersize=11, markeredgewidth=2.6)
