@@ -1,9 +1,11 @@
-"""The reference pages docs/topics.md and docs/parameters.md, made from the running code.
+"""The pages docs/topics.md and docs/parameters.md and the SROS2 policy, from the running code.
 
 Every node is started once in a private context, and asked what it hears, says, offers and takes.
 """
 
 from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,6 +18,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 
 from ja_bringup.graph import NodeSpec
+from ja_bringup.sros_policy import policy_xml
 from ja_common.graph_node import GraphNode
 from ja_common.parameters import UNBOUNDED
 from ja_common.topics import TOPICS
@@ -56,7 +59,22 @@ value is refused with the reason and changes nothing; *fixed* parameters are rea
 
 
 def write_reference(folder: Path) -> list[Path]:
-    """Write both pages into a folder; their paths."""
+    """Write the pages, and the SROS2 policy, into a folder; their paths."""
+    with every_node() as nodes:
+        pages = {
+            'topics.md': topics_page(nodes),
+            'parameters.md': parameters_page(nodes),
+            'sros2_policy.xml': policy_xml(nodes),
+        }
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in pages.items():
+        (folder / name).write_text(text, encoding='utf-8')
+    return [folder / name for name in pages]
+
+
+@contextmanager
+def every_node() -> Iterator[list[GraphNode]]:
+    """One of each node, in a private context, until the block ends."""
     context = Context()
     rclpy.init(args=[], context=context)
     with TemporaryDirectory() as pictures:
@@ -68,15 +86,11 @@ def write_reference(folder: Path) -> list[Path]:
             for spec in NODES:
                 own = overrides.get(spec.thing, [])
                 nodes.append(spec.load()(context=context, parameter_overrides=own))
-            pages = {'topics.md': topics_page(nodes), 'parameters.md': parameters_page(nodes)}
+            yield nodes
         finally:
             for node in nodes:
                 node.destroy_node()
             context.try_shutdown()
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in pages.items():
-        (folder / name).write_text(text, encoding='utf-8')
-    return [folder / name for name in pages]
 
 
 def topics_page(nodes: list[GraphNode]) -> str:
