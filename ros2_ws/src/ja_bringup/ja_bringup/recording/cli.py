@@ -56,13 +56,26 @@ def replay(
     without: Annotated[
         list[str] | None, typer.Option(help='A topic to leave out; may be given several times.')
     ] = None,
+    score: Annotated[
+        bool, typer.Option('--score', help='Publish nothing: teach a learner, print its curve.')
+    ] = False,
+    csv_file: Annotated[
+        Path | None, typer.Option('--csv', help='With --score: one row a trial into this file.')
+    ] = None,
+    as_json: Annotated[bool, typer.Option('--json', help='With --score: print JSON.')] = False,
 ) -> None:
     """Publish a recording again, with /clock, for a node to be tried on it.
 
     Examples: `./ja replay runs/X-record --speed 2`; another detector on the recorded pictures:
-    `./ja replay runs/X-record --without detections --without face_image`.
+    `./ja replay runs/X-record --without detections --without face_image`; another learner over
+    the recorded trials, as fast as it goes: `./ja replay runs/X-record --score --ros-args
+    -p learner:=paper -p seed:=3`.
     """
     from ja_bringup.recording.alone import replay as run
+    from ja_bringup.recording.alone import score as run_score
+
+    if score:
+        sys.exit(run_score(recording, csv_file, as_json, context.obj or []))
 
     parameters = {
         'recording': str(recording),
