@@ -7,6 +7,8 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from urllib.error import URLError
+from urllib.request import urlopen
 
 import cv2
 import numpy as np
@@ -15,9 +17,12 @@ import pytest
 pytestmark = pytest.mark.usefixtures('domain')
 
 
-def start(folder: Path, *args: str) -> subprocess.Popen:
+def start(folder: Path, *args: str, view: bool = False) -> subprocess.Popen:
+    command, *options = args
+    if not view:
+        options = ['--no-view', *options]
     return subprocess.Popen(
-        [sys.executable, '-m', 'ja_bringup.cli', *args],
+        [sys.executable, '-m', 'ja_bringup.cli', command, *options],
         cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )  # fmt: skip
 
@@ -102,6 +107,30 @@ def test_a_missing_parameter_file_is_named(tmp_path):
     assert process.returncode == 1
     assert 'nowhere.yaml' in output
     assert 'Traceback' not in output
+
+
+def test_the_live_page_is_served_beside_the_graph_and_ends_with_it(tmp_path):
+    process = start(tmp_path, 'demo', view=True)
+    lines = iter(process.stdout.readline, '')
+    address = next(line for line in lines if 'live page: ' in line).split('live page: ')[1].strip()
+    page = wait_for_page(address)
+    assert 'Joint attention' in page
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=30)
+    assert process.returncode == 0, output
+    assert 'Traceback' not in output + logs(tmp_path)
+    with pytest.raises(URLError):
+        urlopen(address, timeout=1)
+
+
+def wait_for_page(address: str, timeout_s: float = 40.0) -> str:
+    end = time.monotonic() + timeout_s
+    while True:
+        try:
+            return urlopen(address, timeout=timeout_s).read().decode()
+        except URLError:
+            assert time.monotonic() < end
+            time.sleep(0.1)
 
 
 @pytest.mark.parametrize('composition', [[], ['--one-process']], ids=['many', 'one'])

@@ -47,6 +47,7 @@ PRACTICE_TRIALS = {'gaze_line': 300, 'paper': 1500}
 OnDeathOption = Annotated[OnDeathChoice, typer.Option(help='What to do when a node dies.')]
 OneProcess = Annotated[bool, typer.Option('--one-process', help='All nodes in one process.')]
 Record = Annotated[bool, typer.Option('--record', help='Record all topics into runs/.')]
+View = Annotated[bool, typer.Option(help='Serve the live page, and print its address.')]
 TimeOption = Annotated[float, typer.Option('--time', min=0.0, help='End after so many seconds.')]
 
 
@@ -75,6 +76,7 @@ def demo(
     scene: Annotated[str, typer.Option(help='Scene of the sim, by name or file.')] = 'easy',
     record: Record = False,
     one_process: OneProcess = False,
+    view: View = True,
     on_death: OnDeathOption = OnDeathChoice.stop,
 ) -> None:
     """Watch the simulated head learn to follow the caregiver's gaze."""
@@ -84,7 +86,7 @@ def demo(
     graph = sim_graph(seed, {'scene': scene}, learner.value)
     stages = standard_course(trials or PRACTICE_TRIALS[learner.value], time_s, exam_trials)
     graph = with_arguments([*[RECORDER] * record, *graph], context.obj or [])
-    sys.exit(run_demo(graph, stages, one_process, on_death.value, context.obj or []))
+    sys.exit(run_demo(graph, stages, one_process, on_death.value, context.obj or [], view))
 
 
 @app.command()
@@ -100,6 +102,7 @@ def rig(
     time_s: TimeOption = 0.0,
     record: Record = False,
     one_process: OneProcess = False,
+    view: View = True,
     on_death: OnDeathOption = OnDeathChoice.stop,
 ) -> None:
     """Run the same graph on real pictures: a digital head in them, or a rig's own motors."""
@@ -112,6 +115,7 @@ def rig(
         'Joint attention, on real pictures',
         lambda node: 0.0 < time_s < node.elapsed_s,
         one_process=one_process,
+        view=view,
         on_death=on_death.value,
         arguments=arguments,
     )

@@ -15,6 +15,7 @@ def run_demo(
     one_process: bool,
     on_death: OnDeath,
     arguments: Sequence[str],
+    view: bool = False,
 ) -> int:
     """Lead the graph through the stages of a course; summary, curve and exit code."""
     folder = new_run_folder('demo')
@@ -31,6 +32,7 @@ def run_demo(
         'Joint attention, simulated head',
         over,
         one_process=one_process,
+        view=view,
         on_death=on_death,
         arguments=arguments,
     )

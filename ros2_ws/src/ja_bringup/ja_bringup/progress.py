@@ -19,10 +19,10 @@ from ja_common.topics import DIAGNOSTICS, GATE_STATUS, SCORE
 from ja_sim.core.score import Rate
 
 WINDOW_TRIALS = 100
-# Latched for those who want the last word; we count the trials and want every one.
-_EVERY_SCORE = replace(
+EVERY_SCORE = replace(
     SCORE, hears=QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 )
+"""Latched for those who want the last word; we count the trials and want every one."""
 _SCREEN_EVERY_S = 0.25
 _LINE_EVERY_S = 5.0
 
@@ -40,7 +40,7 @@ class ProgressNode(GraphNode):
         self.began_s = math.nan
         self._image_times_s: deque[float] = deque(maxlen=200)
         self.hear(GATE_STATUS, self._on_gate_status)
-        self.hear(_EVERY_SCORE, self._on_score)
+        self.hear(EVERY_SCORE, self._on_score)
         self.hear(DIAGNOSTICS, self._on_diagnostics)
 
     @property

@@ -2,6 +2,8 @@
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import rclpy
@@ -9,10 +11,12 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as implementation
 
+from ja_bringup.companion import Companion
 from ja_bringup.graph import NodeSpec
 from ja_bringup.one_process import run_in_one_process
 from ja_bringup.progress import Display, ProgressNode
 from ja_bringup.supervisor import OnDeath, Supervisor
+from ja_bringup.view import LIVE_PAGE
 from ja_common.core.config import ConfigError
 from ja_common.ros_defaults import apply_ros_defaults
 
@@ -49,15 +53,18 @@ def run_graph(
     done: Callable[[ProgressNode], bool],
     *,
     one_process: bool = False,
+    view: bool = False,
     on_death: OnDeath = 'stop',
     arguments: Sequence[str] = (),
 ) -> tuple[int, ProgressNode]:
     """Run until `done`, a signal, or a death; the exit code, and the node that has watched.
 
     `arguments`: the ROS arguments that all nodes get (a namespace is the watcher's as well).
+    `view`: serve the live page beside the graph, in a process of its own.
     """
     apply_ros_defaults()
     check_ros_arguments(arguments)
+    graph = [_with_checkpoint(spec, folder) for spec in graph]
     watcher: list[ProgressNode] = []
 
     def make_watcher(context: Context) -> ProgressNode:
@@ -67,10 +74,17 @@ def run_graph(
         )
         return watcher[0]
 
-    with Display(title) as display:
+    with Display(title) as display, ExitStack() as beside:
+        page: Companion | None = None
+        if view:
+            spec = NodeSpec('ja_bringup', 'view', arguments=arguments)
+            page = Companion(spec, folder / 'log', display.say, LIVE_PAGE)
+            beside.enter_context(page)
 
         def is_done() -> bool:
             display.show(watcher[0])
+            if page is not None:
+                page.look()
             return done(watcher[0])
 
         if one_process:
@@ -78,6 +92,14 @@ def run_graph(
         else:
             code = _run_processes(graph, folder, make_watcher, is_done, on_death, display.say)
     return code, watcher[0]
+
+
+def _with_checkpoint(spec: NodeSpec, folder: Path) -> NodeSpec:
+    """What is learned can be saved into the folder of the run, if nobody named another place."""
+    if spec.thing != 'learning_module':
+        return spec
+    ours = {'checkpoint_file': str(folder.absolute() / 'checkpoint.npz')}
+    return replace(spec, parameters={**ours, **spec.parameters})
 
 
 def _run_processes(

@@ -50,7 +50,7 @@ def _blocked(number: signal.Signals) -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-class _Process:
+class NodeProcess:
     """One node's process and its log; the log is a file, so nothing blocks when we are slow."""
 
     def __init__(self, spec: NodeSpec, log: Path) -> None:
@@ -129,7 +129,7 @@ class Supervisor:
         self._on_death = on_death
         self._report = report
         self._patience_s = patience_s
-        self._processes: list[_Process] = []
+        self._processes: list[NodeProcess] = []
         self._asked_to_stop = 0
 
     @property
@@ -164,7 +164,7 @@ class Supervisor:
     def _start(self) -> None:
         self._log_folder.mkdir(parents=True, exist_ok=True)
         for spec in self._graph:
-            self._processes.append(_Process(spec, self._log_folder / f'{spec.thing}.log'))
+            self._processes.append(NodeProcess(spec, self._log_folder / f'{spec.thing}.log'))
 
     def _all_alive(self) -> bool:
         """Report what the nodes complain about; deal with the dead. False: the graph is broken."""

@@ -22,6 +22,10 @@ UNBOUNDED = 1e9
 """Stands in a descriptor for an end that a range does not have."""
 
 
+# Describes what ROS's descriptors have no field for.
+_CHOICES = ' (one of '
+
+
 def declare_config(
     node: Node, config_class: type[Config], changed: Callable[[Config], None] | None = None
 ) -> Config:
@@ -71,12 +75,18 @@ def declare_config(
     return config
 
 
+def choices_of(descriptor: ParameterDescriptor) -> tuple[str, ...]:
+    """What a parameter declared by `declare_config` is chosen from; () when it is no choice."""
+    _, found, choices = descriptor.description.rpartition(_CHOICES)
+    return tuple(choices.rstrip(')').split(', ')) if found else ()
+
+
 def _descriptor(config_field: Any, read_only: bool) -> ParameterDescriptor:
     meta = config_field.metadata
     low, high = meta.get('low'), meta.get('high')
     text = meta['description']
     if meta.get('choices'):
-        text += f' (one of {", ".join(meta["choices"])})'
+        text += f'{_CHOICES}{", ".join(meta["choices"])})'
     # dynamic_typing lets `1` stand for `1.0`; `checked` then holds the type and the range.
     descriptor = ParameterDescriptor(
         name=config_field.name, description=text, dynamic_typing=True, read_only=read_only
