@@ -62,6 +62,17 @@ def test_the_belief_is_a_density():
     assert float(density.sum()) * 0.02**2 == pytest.approx(1.0, abs=1e-3)
 
 
+def test_samples_of_the_belief_are_as_its_density_says(learner):
+    face = drawn_face(np.array([0.4, 0.1]))
+    samples = learner.belief(face, LOOK, np.random.default_rng(0), 4000)
+    assert samples.shape == (4000, 2)
+    # E[-log p] of a density's own samples is its entropy: the same from two independent halves,
+    # and lower than that of the samples moved aside.
+    entropy = [-learner.log_density(face, LOOK, half).mean() for half in np.split(samples, 2)]
+    assert entropy[0] == pytest.approx(entropy[1], abs=0.1)
+    assert -learner.log_density(face, LOOK, samples + 0.1).mean() > np.mean(entropy) + 0.3
+
+
 def test_depth_is_uncertain_along_the_line_of_gaze_and_not_across():
     network = GazeLineNetwork(channels=4)
     gaze = torch.tensor([[0.5, 0.2]])

@@ -7,7 +7,8 @@ from std_srvs.srv import SetBool, Trigger
 from ja_common.core.detection import Detection, Kind
 from ja_common.detection_codec import encode_detections
 from ja_common.image_codec import encode_image
-from ja_common.topics import DETECTIONS, FACE_IMAGE, FIXATION, JOINT_STATES, LM_DELTA
+from ja_common.point_cloud_codec import decode_columns
+from ja_common.topics import BELIEF, DETECTIONS, FACE_IMAGE, FIXATION, JOINT_STATES, LM_DELTA
 from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
 from ja_learning.core.trial import Trial
 from ja_learning.learning_module_node import LearningModuleNode
@@ -245,3 +246,16 @@ def test_another_learner_may_be_chosen_while_the_node_runs(make_bench):
     refused = bench.set_parameter('learner', 'teacher')
     assert not refused.successful
     assert "'teacher' is not one of paper, gaze_line" in refused.reason
+
+
+@pytest.mark.parametrize(('learner', 'samples'), [('paper', 1), ('gaze_line', 200)])
+def test_the_belief_is_told_to_who_looks(make_bench, learner, samples):
+    bench = make_bench(LearningModuleNode, SAYS, [LM_DELTA, BELIEF], learner=learner)
+    life = Life(bench)
+    life.rest(0.0)
+    assert bench.next(BELIEF).width == 0, 'no trial is under way'
+    life.look(pan=0.1)
+    told = decode_columns(bench.next(BELIEF), ('pan', 'tilt', 'weight'))
+    assert len(told['pan']) == samples
+    assert told['weight'].sum() == pytest.approx(1.0, abs=1e-5)
+    assert np.mean(told['pan']) == pytest.approx(0.1, abs=0.1), 'an untaught belief is about her'

@@ -13,6 +13,7 @@ ENVIRONMENT = {
     'MALLOC_MMAP_THRESHOLD_': str(32 * 2**20),
     'MALLOC_TRIM_THRESHOLD_': str(512 * 2**20),
     'MALLOC_TOP_PAD_': str(64 * 2**20),
+    'OMP_NUM_THREADS': '1',
 }
 
 # glibc reads MALLOC_* at a process's start only; mallopt(3) does the same later.

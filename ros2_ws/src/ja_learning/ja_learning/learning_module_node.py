@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from sensor_msgs.msg import Image, JointState, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
@@ -20,14 +19,17 @@ from ja_common.detection_codec import decode_detections
 from ja_common.graph_node import GraphNode, spin_node
 from ja_common.image_codec import decode_image
 from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.point_cloud_codec import encode_columns
 from ja_common.posture_listener import PostureListener
 from ja_common.time_codec import to_ns
-from ja_common.topics import DETECTIONS, FACE_IMAGE, FIXATION, LM_DELTA
+from ja_common.topics import BELIEF, DETECTIONS, FACE_IMAGE, FIXATION, LM_DELTA
 from ja_learning.core.checkpoint import load_checkpoint, save_checkpoint
 from ja_learning.core.gaze_line import GazeLineConfig
 from ja_learning.core.learner import Learner, LearnerChoice, make_learner
 from ja_learning.core.network import NetworkConfig
 from ja_learning.core.trial import TrialRecorder, checked_face
+
+BELIEF_SAMPLES = 200
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,6 @@ class LearningModuleNode(GraphNode):
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('learning_module', **node_kwargs)
-        # Tensors this small are slower on many threads, which the other nodes need besides.
-        torch.set_num_threads(1)
         self._config = self.configure(LearningModuleConfig)
         self._choice = self.configure(LearnerChoice, self._choose)
         self._network_config = self.configure(NetworkConfig)
@@ -66,6 +66,9 @@ class LearningModuleNode(GraphNode):
         self.hear(DETECTIONS, self._on_detections, expected_every_s=2.0)
         self.hear(FIXATION, self._on_fixation, expected_every_s=2.0)
         self._delta = self.say(LM_DELTA)
+        self._belief = self.say(BELIEF)
+        # Its own generator: whether somebody looks changes nothing of what is learned.
+        self._belief_random = np.random.default_rng(self._config.seed)
         self.offer(Trigger, 'save_checkpoint', self._on_save)
         self.offer(Trigger, 'load_checkpoint', self._on_load)
         self.offer(Trigger, 'reset_learning', self._on_reset)
@@ -117,6 +120,20 @@ class LearningModuleNode(GraphNode):
         if trial.face is not None:
             delta = self._learner.propose(trial.face, trial.look_posture, here, trial.candidates)
         self._delta.publish(self._joints.encode(header, delta))
+        if self._belief.get_subscription_count():
+            self._tell_belief(header)
+
+    def _tell_belief(self, header: Header) -> None:
+        directions = np.empty((0, 2))
+        trial = self._trial
+        if trial.face is not None:
+            directions = self._learner.belief(
+                trial.face, trial.look_posture, self._belief_random, BELIEF_SAMPLES
+            )
+        pan, tilt = directions.T
+        weight = np.full(len(directions), 1 / max(len(directions), 1))
+        columns = {'pan': pan, 'tilt': tilt, 'weight': weight}
+        self._belief.publish(encode_columns(header, columns))
 
     def _on_fixation(self, message: JointState) -> None:
         direction = self._joints.decode(message)

@@ -139,6 +139,22 @@ class GazeLineLearner:
             aim = places[int(np.argmax(of_seen))]
         return look + aim - np.asarray(posture, float)
 
+    def belief(
+        self, face: ArrayLike, look: ArrayLike, rng: np.random.Generator, count: int
+    ) -> NDArray[np.float64]:
+        """Directions (count, 2) [rad] drawn from the belief about what she means."""
+        with torch.no_grad():
+            gaze = self._mean.gaze(_picture(face)[None])[0].numpy()
+            shares = torch.softmax(self._mean.stretch_logits, 0).numpy().astype(float)
+            deviations = [
+                torch.exp(logs).numpy()
+                for logs in (self._mean.log_gaze_deviation, self._mean.log_place_deviation)
+            ]
+        stretch = rng.choice(_STRETCHES.numpy(), (count, 1), p=shares / shares.sum())
+        off = stretch * deviations[0] * rng.standard_normal((count, 2))
+        places = stretch * gaze + off + deviations[1] * rng.standard_normal((count, 2))
+        return np.asarray(look, float) + places * _SCALE_RAD
+
     def log_density(
         self, face: ArrayLike, look: ArrayLike, directions: ArrayLike
     ) -> NDArray[np.float64]:

@@ -31,6 +31,11 @@ class Learner(Protocol):
         head is now; `candidates` (m, 2): directions of the objects seen in this trial.
         """
 
+    def belief(
+        self, face: ArrayLike, look: ArrayLike, rng: np.random.Generator, count: int
+    ) -> NDArray[np.float64]:
+        """Directions (n, 2) [rad] drawn from the belief about what she means; n <= count."""
+
     def learn(self, trial: Trial) -> None:
         """Take in a finished trial."""
 

@@ -81,6 +81,12 @@ class ThreeLayerNetwork:
         """The same as `predict`: the paper's learner does not ask what was seen, or from where."""
         return self.predict(face, posture)
 
+    def belief(
+        self, face: ArrayLike, look: ArrayLike, rng: np.random.Generator, count: int
+    ) -> NDArray[np.float64]:
+        """The one direction that it proposes from the look, (1, 2) [rad]: it knows no doubt."""
+        return (np.asarray(look, float) + self.predict(face, look))[np.newaxis]
+
     def learn(self, trial: Trial) -> None:
         """Back-propagation on the pairs of one trial, one step a pair, in the order they came."""
         chosen = slice(-1, None) if self.config.pairs == 'last' else slice(None)
