@@ -14,6 +14,7 @@ from ja_bringup.graph import (
     split_ros_arguments,
     with_arguments,
 )
+from ja_bringup.inspect_cli import register as register_inspection
 from ja_bringup.recording.cli import register as register_recording
 from ja_common.core.config import ConfigError
 from ja_common.ros_defaults import apply_ros_defaults
@@ -23,7 +24,6 @@ app = typer.Typer(
     help='A camera head that learns joint attention, on ROS 2. ROS arguments go behind '
     '`--ros-args`, as for any node: -r, -p, --params-file, __ns.',
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 
@@ -148,6 +148,7 @@ def reference(
 
 register_experiments(app)
 register_recording(app)
+register_inspection(app)
 
 
 def main() -> None:
