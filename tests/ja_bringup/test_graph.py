@@ -99,3 +99,15 @@ def test_every_configured_parameter_exists_in_the_node_it_is_for(path, ros_conte
         unknown = [name for name in content['ros__parameters'] if not node.has_parameter(name)]
         node.destroy_node()
         assert not unknown, f'{path.name}, {section}: no such parameter'
+
+
+@pytest.mark.parametrize('name', ['rig_ros2_control', 'rig_topics'])
+def test_configurations_of_rigs_fit_the_gate(name, ros_context):
+    """A name or value that the gate does not know would be an error here, not on the rig."""
+    [gate] = [spec for spec in rig_graph() if spec.thing == 'gate']
+    parameters = {**gate.parameters, **preset(CONFIG / f'{name}.yaml', 'gate')}
+    spec = NodeSpec('ja_control', 'gate', parameters)
+    node = spec.load()(context=ros_context, cli_args=spec.ros_arguments())
+    declared = {each: node.get_parameter(each).value for each in parameters}
+    node.destroy_node()
+    assert declared == parameters

@@ -25,7 +25,7 @@ LIMITS = JointLimitsConfig(
 CONFIG = BorderConfig(
     dead_zone_rad=0.005,
     stale_after_s=0.5,
-    silent_after_s=0.1,
+    hold_after_s=0.1,
     stall_error_rad=0.1,
     stall_after_s=0.3,
     retry_after_s=1.0,
@@ -138,7 +138,7 @@ def test_missing_or_stale_input_stops_the_head_and_its_return_moves_it_again(fai
     assert moving[-1].velocity[0] == pytest.approx(2.0)
     vars(rig).update(fail)
     stopping = rig.run(0.4, aim=(0.7, 0.0))
-    assert stopped_after_s(stopping) <= CONFIG.silent_after_s + 2.0 / 40.0 + 3 * PERIOD_S
+    assert stopped_after_s(stopping) <= CONFIG.hold_after_s + 2.0 / 40.0 + 3 * PERIOD_S
     assert stopping[-1].hold.cause is cause
     assert stopping[-1].hold.level is Level.WARN
     vars(rig).update(before)

@@ -409,7 +409,7 @@ def real_time(make_bench):
 
 
 def test_commands_come_at_the_control_rate_and_follow_the_profile(real_time):
-    rig = real_time(silent_after_s=5.0, stall_after_s=5.0)
+    rig = real_time(hold_after_s=5.0, stall_after_s=5.0)
     rig.images(lambda: rig.pan < -0.2)
     commands = rig.bench.heard(JOINT_COMMANDS)
     pans = [command.position[0] for command in commands]
@@ -421,7 +421,7 @@ def test_commands_come_at_the_control_rate_and_follow_the_profile(real_time):
 
 
 def test_silence_brakes_the_head_names_what_is_missing_and_passes(real_time):
-    rig = real_time(silent_after_s=1.0, stale_after_s=9.0, stall_after_s=9.0)
+    rig = real_time(hold_after_s=1.0, stale_after_s=9.0, stall_after_s=9.0)
     rig.images(lambda: rig.pan < -0.1)
     rig.images(lambda: rig.reason(), without=[LM_DELTA, VF_DELTA])
     assert 'missing: learning_module/delta, visual_feedback/delta' in rig.reason()
@@ -433,7 +433,7 @@ def test_silence_brakes_the_head_names_what_is_missing_and_passes(real_time):
 
 
 def test_missing_joint_states_are_named(real_time):
-    rig = real_time(silent_after_s=1.0, stale_after_s=9.0, stall_after_s=9.0)
+    rig = real_time(hold_after_s=1.0, stale_after_s=9.0, stall_after_s=9.0)
     rig.images(lambda: rig.pan < -0.05)
     rig.images(lambda: rig.reason(), joints=False)
     assert rig.reason().endswith('missing: joint_states')
@@ -443,6 +443,6 @@ def test_missing_joint_states_are_named(real_time):
     ('age_s', 'text'), [(2.0, 'image is older than'), (-2.0, 'stamped ahead of the clock')]
 )
 def test_image_of_another_time_holds_the_head(real_time, age_s, text):
-    rig = real_time(silent_after_s=5.0)
+    rig = real_time(hold_after_s=5.0)
     rig.images(lambda: text in rig.reason(), age_s=age_s)
     assert not rig.bench.heard(JOINT_COMMANDS), 'nothing was ever commanded'

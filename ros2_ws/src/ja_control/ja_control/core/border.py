@@ -35,7 +35,7 @@ class BorderConfig:
     stale_after_s: float = parameter(
         0.5, 'hold when the newest image or joint state is older', low=0.02, high=60.0
     )
-    silent_after_s: float = parameter(
+    hold_after_s: float = parameter(
         0.13, 'hold when no image has been judged by all for so long', low=0.02, high=60.0
     )
     stall_error_rad: float = parameter(
@@ -269,8 +269,8 @@ class Border:
                 return Hold(cause, f'the newest {what} is older than {c.stale_after_s:g} s')
             if stamp_s - now_s > c.stale_after_s:
                 return Hold(cause, f'the newest {what} is stamped ahead of the clock')
-        if now_s - self._judged_s > c.silent_after_s:
-            return Hold(Cause.SILENT, f'no complete image for {c.silent_after_s:g} s')
+        if now_s - self._judged_s > c.hold_after_s:
+            return Hold(Cause.SILENT, f'no complete image for {c.hold_after_s:g} s')
         if now_s < self._stalled_until_s or self._does_not_follow():
             text = f'a joint does not follow its command within {c.stall_error_rad:g} rad'
             return Hold(Cause.STALLED, text)
