@@ -11,7 +11,8 @@ from nicegui import ui
 from nicegui.testing import User, user_simulation
 
 from ja_bringup.core.view_model import CurvePoints, Light, Run, State
-from ja_bringup.view.page import PICTURE_URL, Page, facts_html, nodes_html
+from ja_bringup.view import PICTURE_URL
+from ja_bringup.view.page import Page, facts_html, nodes_html
 from ja_bringup.view.server import picture_app
 from ja_bringup.view.sight import Picture
 from ja_bringup.view_node import Frame

@@ -110,6 +110,14 @@ class ViewNode(GraphNode):
         self.create_timer(_ASK_EVERY_S, self._ask_parameters, clock=steady)
         self.frame = self._gather()
 
+    def destroy_node(self) -> None:
+        """Let go of the mailboxes, which the node does not know, then of the node."""
+        self._fixations.close()
+        self._statuses.close()
+        if self._sight is not None:
+            self._sight.close()
+        super().destroy_node()
+
     def watched(self) -> None:
         """Somebody looks at the page; to be said again and again while it is true."""
         self._watched_s = time.monotonic()

@@ -2,3 +2,5 @@
 
 LIVE_PAGE = 'live page: '
 """What stands before the address when the page is served."""
+
+PICTURE_URL = '/picture.jpg'

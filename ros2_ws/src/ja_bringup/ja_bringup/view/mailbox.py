@@ -2,60 +2,45 @@
 
 from typing import Any
 
-from rclpy.callback_groups import CallbackGroup
-from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.impl.implementation_singleton import rclpy_implementation as implementation
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.type_support import check_for_type_support
 
 from ja_common.topics import Topic
 
 
-class _Asleep(CallbackGroup):
-    """Nothing in it is ever executed, so that no executor wakes for it."""
-
-    def can_execute(self, _entity: Any) -> bool:
-        return False
-
-    def beginning_execution(self, _entity: Any) -> bool:
-        return False
-
-    def ending_execution(self, _entity: Any) -> None:
-        return None
-
-
 class Mailbox:
-    """Keeps the newest messages of a topic in the middleware; the publisher never waits for us."""
+    """Keeps the newest messages of a topic in the middleware; the publisher never waits for us.
+
+    The node does not know of the subscription, and so no executor waits for it: on a graph that
+    says a thousand messages a second, waking for each would cost more than all that we do with
+    the few that we look at.
+    """
 
     def __init__(self, node: Node, topic: Topic, depth: int) -> None:
         """Best effort, whatever the topic's own quality of service; up to `depth` messages."""
-        self._node = node
-        self._subscription = node.create_subscription(
-            topic.type,
-            topic.name,
-            lambda _: None,
-            _quiet(depth),
-            callback_group=_Asleep(),
-            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+        check_for_type_support(topic.type)
+        self._type = topic.type
+        quiet = QoSProfile(
+            depth=depth,
+            reliability=ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.VOLATILE,
         )
+        with node.handle:
+            self._handle = implementation.Subscription(
+                node.handle, topic.type, topic.name, quiet.get_c_qos_profile()
+            )
 
     def take(self) -> list[tuple[Any, int]]:
         """What has come since the last call, oldest first, each with the time [ns] of sending."""
         taken = []
-        handle = self._subscription.handle
-        with handle:
-            while (found := handle.take_message(self._subscription.msg_type, False)) is not None:
+        with self._handle:
+            while (found := self._handle.take_message(self._type, False)) is not None:
                 message, information = found
                 taken.append((message, information['source_timestamp']))
         return taken
 
     def close(self) -> None:
         """Unsubscribe."""
-        self._node.destroy_subscription(self._subscription)
-
-
-def _quiet(depth: int) -> QoSProfile:
-    return QoSProfile(
-        depth=depth,
-        reliability=ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.VOLATILE,
-    )
+        self._handle.destroy_when_not_in_use()

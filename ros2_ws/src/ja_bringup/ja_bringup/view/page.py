@@ -8,9 +8,9 @@ from nicegui import ui
 
 from ja_bringup.core import drawings
 from ja_bringup.core.view_model import CurvePoints, Light, Run
+from ja_bringup.view import PICTURE_URL
 from ja_common.core.health import Level
 
-PICTURE_URL = '/picture.jpg'
 _PICTURE_EVERY_S = 0.1
 _REST_EVERY_S = 0.25
 _SPEEDS = {0.0: 'as fast as it can', 0.25: '¼ x', 0.5: '½ x', 1.0: '1 x', 2.0: '2 x', 5.0: '5 x'}
@@ -33,6 +33,7 @@ _STYLE = """
 .ja-nodes { width: 100%; font-size: .82rem; border-spacing: 0 3px; border-collapse: separate }
 .ja-nodes td { vertical-align: top; padding-right: 8px; overflow-wrap: anywhere }
 .ja-light { display: inline-block; width: .7em; height: .7em; border-radius: 50% }
+.ja-log * { white-space: pre-wrap; overflow-wrap: anywhere }
 .ja-quiet { color: #94a3b8 }
 body { background: #0f172a }
 """
@@ -98,7 +99,8 @@ class _View:
             with self._card('Nodes'):
                 self._nodes = ui.html(sanitize=False).mark('nodes')
             with self._card('Log'):
-                self._log = ui.log(max_lines=200).classes('w-full text-xs').style('height: 220px')
+                self._log = ui.log(max_lines=200).classes('ja-log w-full text-xs')
+                self._log.style('height: 220px')
         ui.timer(_PICTURE_EVERY_S, self._show_picture)
         ui.timer(_REST_EVERY_S, self._show_rest)
         self._show_rest()
@@ -256,7 +258,9 @@ def _chart_options() -> dict[str, Any]:
         'grid': {'left': 34, 'right': 8, 'top': 28, 'bottom': 24},
         'legend': {'top': 0, 'data': ['success', 'p(LM)'], 'textStyle': {'color': '#94a3b8'}},
         'xAxis': {'type': 'value', 'max': 'dataMax', 'splitLine': {'show': False}},
-        'yAxis': {'type': 'value', 'min': 0, 'max': 1},
+        'yAxis': {
+            'type': 'value', 'min': 0, 'max': 1, 'splitLine': {'lineStyle': {'color': '#334155'}},
+        },
         'tooltip': {'trigger': 'axis'},
         'series': [
             {**thin, 'name': 'low'},

@@ -8,7 +8,8 @@ import uvicorn
 from fastapi import FastAPI, Response
 from nicegui import ui
 
-from ja_bringup.view.page import PICTURE_URL, Page, Robot
+from ja_bringup.view import PICTURE_URL
+from ja_bringup.view.page import Page, Robot
 from ja_common.core.config import ConfigError
 
 _GRACE_S = 1
@@ -50,11 +51,15 @@ def web_app(robot: Robot) -> FastAPI:
 
 
 def picture_app(robot: Robot) -> FastAPI:
-    """The newest picture as JPEG, drawn when it is asked for: the browser sets the pace."""
+    """The newest picture as JPEG, drawn when it is asked for: the browser sets the pace.
+
+    Who asks for it watches the robot.
+    """
     app = FastAPI()
 
     @app.get(PICTURE_URL)
     def picture() -> Response:
+        robot.watched()
         shown = robot.frame.picture
         if shown is None:
             return Response(status_code=404)

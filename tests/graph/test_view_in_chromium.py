@@ -1,0 +1,137 @@
+"""The live page of a running graph in a real browser; docs/view.md says what it needs.
+
+JA_SCREENSHOTS=FOLDER keeps what it saw.
+"""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+CHROMIUM, DRIVER = shutil.which('chromium'), shutil.which('chromedriver')
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not (CHROMIUM and DRIVER), reason='needs chromium and chromium-driver'
+    ),
+]
+
+# Name, width and height [px], and whether it is a phone.
+SCREENS = [('laptop', 1366, 1000, False), ('phone', 390, 844, True)]
+
+
+@pytest.fixture
+def demo(domain: int, tmp_path: Path) -> Iterator[tuple[str, int]]:
+    """A demo that runs: the address of its page, and its process id."""
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'ja_bringup.cli', 'demo', '--exam', '0', '--on-death', 'restart'],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+    line = next(line for line in iter(process.stdout.readline, '') if 'live page: ' in line)
+    yield line.split('live page: ')[1].strip(), process.pid
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 0, output
+
+
+@pytest.fixture
+def browse() -> Iterator[Callable]:
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    browsers = []
+
+    def start(width: int, height: int, phone: bool) -> webdriver.Chrome:
+        options = webdriver.ChromeOptions()
+        options.binary_location = CHROMIUM
+        for flag in (
+            'headless=new', 'no-sandbox', 'disable-gpu', 'disable-quic', 'no-first-run',
+            'disable-background-networking', 'disable-component-update', 'disable-sync',
+            'hide-scrollbars',
+        ):  # fmt: skip
+            options.add_argument(f'--{flag}')
+        browser = webdriver.Chrome(options=options, service=Service(DRIVER))
+        browsers.append(browser)
+        screen = {'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': phone}
+        browser.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', screen)
+        return browser
+
+    yield start
+    for browser in browsers:
+        browser.quit()
+
+
+def wait(condition: Callable[[], object], timeout_s: float = 60.0) -> None:
+    end = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < end, 'the page did not come so far'
+        time.sleep(0.1)
+
+
+def keep(browser, name: str) -> None:
+    if folder := os.environ.get('JA_SCREENSHOTS'):
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        browser.save_screenshot(str(Path(folder) / f'view_{name}.png'))
+
+
+def text(browser) -> str:
+    return browser.find_element('css selector', 'body').text
+
+
+def picture(browser) -> np.ndarray:
+    """The robot's picture as the browser shows it."""
+    png = browser.find_element('css selector', 'img').screenshot_as_png
+    return cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
+
+
+@pytest.mark.parametrize('screen', SCREENS, ids=lambda screen: screen[0])
+def test_people_see_and_steer_the_robot(screen, demo, browse):
+    name, width, height, phone = screen
+    browser = browse(width, height, phone)
+    browser.get(demo[0])
+    wait(lambda: 'running' in text(browser) and 'fixated by' in text(browser))
+    wait(lambda: browser.execute_script('return document.images[0]?.naturalWidth') == 640)
+    first = picture(browser)
+    wait(lambda: np.abs(picture(browser).astype(int) - first).mean() > 2)
+    wide = browser.execute_script('return document.documentElement.scrollWidth')
+    assert wide <= width, 'nothing sticks out to the side'
+    keep(browser, name)
+
+    toggle = browser.find_element('xpath', "//div[contains(@class,'q-toggle')][.='pause']")
+    toggle.click()
+    wait(lambda: 'the simulation is paused' in text(browser))
+    keep(browser, f'{name}_paused')
+    toggle.click()
+    wait(lambda: 'the simulation is paused' not in text(browser))
+
+
+def test_a_frozen_graph_is_shown_as_stopped(demo, browse):
+    browser = browse(*SCREENS[0][1:])
+    address, pid = demo
+    browser.get(address)
+    wait(lambda: 'fixated by' in text(browser))
+    bright = picture(browser).mean()
+    sim = child(pid, 'ja_sim.sim_node')
+    os.kill(sim, signal.SIGSTOP)
+    try:
+        wait(lambda: 'no new image for' in text(browser))
+        assert picture(browser).mean() < 0.7 * bright, 'the old picture is darkened'
+        keep(browser, 'stopped')
+    finally:
+        os.kill(sim, signal.SIGCONT)
+    wait(lambda: 'no new image for' not in text(browser))
+
+
+def child(parent: int, module: str) -> int:
+    """Process id of the node that a demo has started."""
+    children = Path(f'/proc/{parent}/task/{parent}/children').read_text().split()
+    return next(int(p) for p in children if module in Path(f'/proc/{p}/cmdline').read_text())
