@@ -1,6 +1,6 @@
 """Faults in the running graph: kill and freeze every node, and watch what the head does.
 
-`python -m ja_bringup.faults` prints the table of docs/faults.md. Each fault is done while the head
+`python -m ja_bringup.faults` prints a table in Markdown. Each fault is done while the head
 turns; the times are taken from the commands, at one listener.
 """
 
