@@ -35,10 +35,6 @@ def main() -> None:
         node.main()
     except KeyboardInterrupt:
         pass
-    except RuntimeError as error:
-        # Asked to stop while the node was being made: rclpy has shut its context down under it.
-        if 'context is' not in str(error):
-            raise
 
 
 if __name__ == '__main__':

@@ -5,11 +5,11 @@ from collections.abc import Callable, Sequence
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from ja_bringup.graph import NodeSpec
 from ja_common.core.config import ConfigError
+from ja_common.executor import KeptWaitSetExecutor
 
 
 def run_in_one_process(
@@ -24,7 +24,7 @@ def run_in_one_process(
     """
     context = Context()
     rclpy.init(args=[], context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-    executor = SingleThreadedExecutor(context=context)
+    executor = KeptWaitSetExecutor(context=context)
     stop = _Stop()
     nodes: list[Node] = []
     try:

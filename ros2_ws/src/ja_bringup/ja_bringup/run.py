@@ -8,7 +8,6 @@ from pathlib import Path
 
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as implementation
 
 from ja_bringup.companion import Companion
@@ -18,6 +17,7 @@ from ja_bringup.progress import Display, ProgressNode
 from ja_bringup.supervisor import OnDeath, Supervisor
 from ja_bringup.view import LIVE_PAGE
 from ja_common.core.config import ConfigError
+from ja_common.executor import KeptWaitSetExecutor
 from ja_common.ros_defaults import apply_ros_defaults
 
 
@@ -112,7 +112,7 @@ def _run_processes(
 ) -> int:
     context = Context()
     rclpy.init(args=[], context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-    executor = SingleThreadedExecutor(context=context)
+    executor = KeptWaitSetExecutor(context=context)
     node = make_watcher(context)
     executor.add_node(node)
 

@@ -10,13 +10,15 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.exceptions import NotInitializedException
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
 from ja_common.core.config import ConfigError
 from ja_common.core.health import Health, Level
+from ja_common.executor import KeptWaitSetExecutor
 from ja_common.parameters import declare_config
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_common.topics import DIAGNOSTICS, Topic
@@ -170,7 +172,7 @@ def spin_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) 
     try:
         _init(args)
         node = make_node()
-        executor = SingleThreadedExecutor()
+        executor = KeptWaitSetExecutor()
         executor.add_node(node)
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
@@ -178,14 +180,25 @@ def spin_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) 
     except (ConfigError, OSError) as error:
         print(f'error: {error}', file=sys.stderr)
         sys.exit(2)
+    except (RuntimeError, NotInitializedException):
+        # Asked to stop while the node was being made: rclpy has ended its context under it.
+        if rclpy.ok():
+            raise
     finally:
-        # A second Ctrl-C may arrive in here; the node has ended all the same.
-        try:
-            if node is not None:
-                node.destroy_node()
-            rclpy.try_shutdown()
-        except KeyboardInterrupt:
-            pass
+        _end(node)
+
+
+def _end(node: Node | None) -> None:
+    try:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    except KeyboardInterrupt:
+        pass  # a second Ctrl-C: the node has ended all the same
+    except RuntimeError:
+        # rclpy's own signal handler may end the context at the very same moment.
+        if rclpy.ok():
+            raise
 
 
 def _init(args: Sequence[str] | None) -> None:

@@ -1,0 +1,123 @@
+"""The executor that keeps its wait set: it serves all that rclpy's serves."""
+
+from collections.abc import Iterator
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from std_msgs.msg import Int32
+from std_srvs.srv import Trigger
+
+from ja_common.executor import KeptWaitSetExecutor
+from ros_testing import spin_until
+
+
+@pytest.fixture
+def executor(ros_context: Context) -> Iterator[KeptWaitSetExecutor]:
+    executor = KeptWaitSetExecutor(context=ros_context)
+    yield executor
+    nodes = executor.get_nodes()
+    executor.shutdown()
+    for node in nodes:
+        node.destroy_node()
+
+
+@pytest.fixture
+def node(executor: KeptWaitSetExecutor, ros_context: Context) -> Node:
+    node = rclpy.create_node('node', context=ros_context)
+    executor.add_node(node)
+    return node
+
+
+def test_messages_timers_and_services_are_served(executor, node):
+    heard, beats = [], []
+    node.create_subscription(Int32, 'number', lambda message: heard.append(message.data), 10)
+    publisher = node.create_publisher(Int32, 'number', 10)
+    node.create_timer(0.01, lambda: beats.append(len(beats)))
+
+    def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.message = 'here'
+        return response
+
+    node.create_service(Trigger, 'ask', answer)
+    client = node.create_client(Trigger, 'ask')
+    spin_until(executor, client.service_is_ready)
+    future, told = client.call_async(Trigger.Request()), []
+    future.add_done_callback(lambda done: told.append(done.result().message))
+    for number in range(5):
+        publisher.publish(Int32(data=number))
+    spin_until(executor, lambda: len(heard) == 5 and len(beats) > 3 and told)
+    assert heard == [0, 1, 2, 3, 4]
+    assert told == ['here']
+
+
+def test_what_a_callback_makes_or_destroys_is_noticed(executor, node):
+    heard, beats = [], []
+
+    def begin() -> None:
+        node.destroy_timer(timer)
+        beats.append('begin')
+        node.create_subscription(Int32, 'late', lambda message: heard.append(message.data), 10)
+
+    timer = node.create_timer(0.001, begin)
+    publisher = node.create_publisher(Int32, 'late', 10)
+    spin_until(executor, publisher.get_subscription_count)
+    publisher.publish(Int32(data=7))
+    spin_until(executor, lambda: heard)
+    assert heard == [7]
+    assert beats == ['begin']
+
+
+def test_a_node_may_come_and_go(executor, node, ros_context):
+    heard = []
+    publisher = node.create_publisher(Int32, 'number', 10)
+    guest = rclpy.create_node('guest', context=ros_context)
+    guest.create_subscription(Int32, 'number', lambda message: heard.append(message.data), 10)
+    executor.add_node(guest)
+    spin_until(executor, publisher.get_subscription_count)
+    publisher.publish(Int32(data=1))
+    spin_until(executor, lambda: heard)
+    executor.remove_node(guest)
+    publisher.publish(Int32(data=2))
+    for _ in range(10):
+        executor.spin_once(timeout_sec=0.01)
+    assert heard == [1]
+    guest.destroy_node()
+
+
+def test_nodes_are_served_in_the_order_of_their_names(executor, ros_context):
+    order = []
+    for name in ('charlie', 'alpha', 'bravo'):
+        node = rclpy.create_node(name, context=ros_context)
+        node.create_subscription(Int32, 'number', lambda _, name=name: order.append(name), 10)
+        executor.add_node(node)
+    publisher = executor.get_nodes()[0].create_publisher(Int32, 'number', 10)
+    spin_until(executor, lambda: publisher.get_subscription_count() == 3)
+    publisher.publish(Int32())
+    spin_until(executor, lambda: len(order) == 3)
+    assert order == ['alpha', 'bravo', 'charlie']
+
+
+def test_a_fault_of_a_callback_is_raised_and_one_that_waits_is_refused(executor, node):
+    def fail() -> None:
+        raise ZeroDivisionError
+
+    timer = node.create_timer(0.001, fail)
+    with pytest.raises(ZeroDivisionError):
+        spin_until(executor, lambda: False)
+    node.destroy_timer(timer)
+
+    async def wait() -> None:
+        await rclpy.task.Future()
+
+    node.create_timer(0.001, wait)
+    with pytest.raises(TypeError, match='plain functions only'):
+        spin_until(executor, lambda: False)
+
+
+def test_the_end_of_the_context_ends_the_spinning(executor, node, ros_context):
+    node.create_timer(0.001, ros_context.shutdown)
+    with pytest.raises(ExternalShutdownException):
+        spin_until(executor, lambda: False)
