@@ -21,9 +21,9 @@ def curve() -> LearningCurve:
     return curve
 
 
-def test_rate_over_the_last_trials_only(curve):
-    assert curve.recent_rates(2) == pytest.approx([0, 1 / 2, 1, 1 / 2, 1 / 2])
-    assert curve.recent_rates(100) == pytest.approx([0, 1 / 2, 2 / 3, 1 / 2, 3 / 5])
+def test_rate_over_the_last_trials_of_its_stage_only(curve):
+    assert curve.recent_rates(2) == pytest.approx([0, 1, 1, 1 / 2, 1 / 2])
+    assert curve.recent_rates(100) == pytest.approx([0, 1, 1, 2 / 3, 3 / 4])
     assert LearningCurve().recent_rates(2).shape == (0,)
 
 

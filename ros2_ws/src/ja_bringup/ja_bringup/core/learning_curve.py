@@ -44,8 +44,10 @@ class LearningCurve:
         return Rate(sum(record.success for record in chosen), len(chosen))
 
     def recent_rates(self, window: int) -> NDArray[np.float64]:
-        """Success rate over the last `window` trials after every trial, shape (n,)."""
+        """Success rate after every trial, shape (n,), over the last `window` of its stage."""
         successes = np.cumsum([0, *(record.success for record in self.records)])
         trials = np.arange(1, len(successes))
-        first = np.maximum(trials - window, 0)
+        stages = [record.stage for record in self.records]
+        begins = [0, *(i for i in range(1, len(stages)) if stages[i] != stages[i - 1])]
+        first = np.maximum(trials - window, np.repeat(begins, np.diff([*begins, len(stages)])))
         return (successes[trials] - successes[first]) / (trials - first)

@@ -53,11 +53,15 @@ def _converted(name: str, wanted: type, value: Any) -> Any:
         value = float(value)
     if type(value) is not wanted:
         raise ConfigError(
-            f'{name} = {value!r} is a {type(value).__name__}; a {wanted.__name__} is needed'
+            f'{name} = {value!r} is {_named(type(value))}; {_named(wanted)} is needed'
         )
     if isinstance(value, float) and not math.isfinite(value):
         raise ConfigError(f'{name} = {value!r} is not a finite number')
     return value
+
+
+def _named(kind: type) -> str:
+    return f'{"an" if kind is int else "a"} {kind.__name__}'
 
 
 def _range_text(low: float | None, high: float | None) -> str:

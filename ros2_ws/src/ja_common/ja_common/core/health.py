@@ -13,6 +13,10 @@ class Level(IntEnum):
     STALE = 3
 
 
+FIRST_WORD_TIMES = 3.0
+"""An input that has never spoken is given so many times as long: others may still be starting."""
+
+
 @dataclass
 class _Input:
     expected_every_s: float | None
@@ -70,9 +74,13 @@ class Health:
         """Inputs silent for longer than expected, with the time [s] that was allowed."""
         silence = {}
         for name, entry in self._inputs.items():
-            since = self._started_s if entry.heard_at_s is None else entry.heard_at_s
-            if entry.expected_every_s is not None and now_s - since > entry.expected_every_s:
-                silence[name] = entry.expected_every_s
+            if entry.expected_every_s is None:
+                continue
+            allowed_s, since_s = entry.expected_every_s, entry.heard_at_s
+            if since_s is None:
+                allowed_s, since_s = FIRST_WORD_TIMES * allowed_s, self._started_s
+            if now_s - since_s > allowed_s:
+                silence[name] = allowed_s
         return silence
 
     def report(self, now_s: float) -> Report:
