@@ -16,9 +16,7 @@ from rich.table import Table
 
 from ja_bringup.graph import NodeSpec
 from ja_bringup.one_process import run_in_one_process
-from ja_bringup.player_node import PlayerNode
 from ja_bringup.progress import rate_text
-from ja_bringup.recorder_node import RecorderNode
 from ja_bringup.recording.learner_score import score_learner, success_rate, write_csv
 from ja_bringup.recording.reader import Recording
 from ja_bringup.run import check_ros_arguments
@@ -32,7 +30,7 @@ def record(parameters: Mapping[str, Any], time_s: float, arguments: Sequence[str
     columns = (TextColumn('recording'), TextColumn('{task.description}'))
     with Progress(*columns, transient=True) as progress:
         task = progress.add_task('')
-        nodes: list[RecorderNode] = []
+        nodes: list[Any] = []
 
         def done() -> bool:
             [node] = nodes
@@ -43,7 +41,7 @@ def record(parameters: Mapping[str, Any], time_s: float, arguments: Sequence[str
             )
             return node.writer.failure is not None or 0 < time_s < node.elapsed_s
 
-        code = _run(RecorderNode, spec, nodes, done)
+        code = _run(spec, nodes, done)
     if code or not nodes:
         return code
     writer = nodes[0].writer
@@ -63,7 +61,7 @@ def replay(parameters: Mapping[str, Any], arguments: Sequence[str]) -> int:
     )  # fmt: skip
     with Progress(*columns) as progress:
         task = progress.add_task('')
-        nodes: list[PlayerNode] = []
+        nodes: list[Any] = []
 
         def done() -> bool:
             [node] = nodes
@@ -72,7 +70,7 @@ def replay(parameters: Mapping[str, Any], arguments: Sequence[str]) -> int:
             progress.update(task, total=length_s, completed=position_s)
             return node.done
 
-        code = _run(PlayerNode, spec, nodes, done)
+        code = _run(spec, nodes, done)
     if nodes:
         print(f'{nodes[0].played} messages played')
     return code
@@ -111,13 +109,12 @@ def score(path: Path, csv_file: Path | None, as_json: bool, arguments: Sequence[
     return 0
 
 
-def _run(
-    make: Callable[..., Any], spec: NodeSpec, nodes: list[Any], done: Callable[[], bool]
-) -> int:
+def _run(spec: NodeSpec, nodes: list[Any], done: Callable[[], bool]) -> int:
     check_ros_arguments(spec.ros_arguments()[1:])
 
     def make_node(context: Context) -> Node:
         arguments = spec.ros_arguments()
+        make = spec.load()
         nodes.append(make(context=context, cli_args=arguments, use_global_arguments=False))
         return nodes[0]
 

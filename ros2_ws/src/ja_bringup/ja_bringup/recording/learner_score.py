@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message
 
 from ja_bringup.graph import NodeSpec
-from ja_bringup.recording.driven_node import DrivenNode, driven
+from ja_bringup.recording.drive import DrivenNode, driven
 from ja_bringup.recording.message_types import message_class
 from ja_bringup.recording.reader import RecordedMessage, Recording
 from ja_common.core.config import ConfigError
