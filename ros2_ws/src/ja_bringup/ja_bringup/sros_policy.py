@@ -8,14 +8,14 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Mapping
 
 from ja_common.graph_node import GraphNode
-from ja_common.topics import CLOCK, FORWARD_COMMANDS, JOINT_TRAJECTORY, ROBOT_DESCRIPTION
+from ja_common.topics import CLOCK, FORWARD_COMMANDS, JOINT_TRAJECTORY, LOG, ROBOT_DESCRIPTION
 
 # By configuration, so that a running default node does not show it.
 _BY_CONFIGURATION: Mapping[str, tuple[set[str], set[str]]] = {
     'gate': ({JOINT_TRAJECTORY.name, FORWARD_COMMANDS.name}, {ROBOT_DESCRIPTION.name}),
 }
 # What rclpy itself gives every node (`~/` is the node's own name).
-_SAID_BY_ALL = ('rosout', 'parameter_events')
+_SAID_BY_ALL = (LOG.name.lstrip('/'), 'parameter_events')
 _HEARD_BY_ALL = (CLOCK.name.lstrip('/'), 'parameter_events')
 _OFFERED_BY_ALL = (
     'describe_parameters',
