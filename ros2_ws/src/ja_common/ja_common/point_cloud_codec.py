@@ -11,7 +11,7 @@ from std_msgs.msg import Header
 
 def encode_columns(header: Header, columns: Mapping[str, ArrayLike]) -> PointCloud2:
     """A message whose points are the rows of the columns, each of shape (n,), as float32."""
-    table = np.column_stack([np.asarray(column, np.float32) for column in columns.values()])
+    table = np.array([*columns.values()], '<f4').T
     return PointCloud2(
         header=header,
         height=1,
@@ -23,7 +23,7 @@ def encode_columns(header: Header, columns: Mapping[str, ArrayLike]) -> PointClo
         is_bigendian=False,
         point_step=4 * len(columns),
         row_step=table.nbytes,
-        data=array.array('B', table.astype('<f4').tobytes()),
+        data=array.array('B', table.tobytes()),
         is_dense=True,
     )
 
@@ -43,13 +43,17 @@ def decode_columns(message: PointCloud2, names: Sequence[str]) -> dict[str, NDAr
             f'a point cloud of {points} points of {message.point_step} bytes holds '
             f'{len(message.data)} bytes of data'
         )
-    raw = np.frombuffer(message.data, np.uint8).reshape(points, message.point_step)
-    order = '>f4' if message.is_bigendian else '<f4'
-    columns = {}
     for name in names:
         field = fields[name]
         if field.datatype != PointField.FLOAT32 or field.offset + 4 > message.point_step:
             raise ValueError(f'field {name!r} of the point cloud is not a float32 inside a point')
-        column = np.ascontiguousarray(raw[:, field.offset : field.offset + 4])
-        columns[name] = column.view(order).reshape(points).astype(np.float32)
-    return columns
+    layout = np.dtype(
+        {
+            'names': names,
+            'formats': ['>f4' if message.is_bigendian else '<f4'] * len(names),
+            'offsets': [fields[name].offset for name in names],
+            'itemsize': message.point_step,
+        }
+    )
+    table = np.frombuffer(message.data, layout)
+    return {name: table[name].astype(np.float32) for name in names}
