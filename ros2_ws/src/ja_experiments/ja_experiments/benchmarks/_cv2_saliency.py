@@ -9,6 +9,7 @@ import json
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,9 +18,10 @@ import numpy as np
 def main() -> None:
     """Judge all pictures of the folder, in the order of their names."""
     cv2.setNumThreads(1)
+    saliency: Any = getattr(cv2, 'saliency')  # noqa: B009 - opencv-contrib has it, headless not
     methods = {
-        'fine grained': cv2.saliency.StaticSaliencyFineGrained_create(),
-        'spectral residual': cv2.saliency.StaticSaliencySpectralResidual_create(),
+        'fine grained': saliency.StaticSaliencyFineGrained_create(),
+        'spectral residual': saliency.StaticSaliencySpectralResidual_create(),
     }
     pictures = [cv2.imread(str(path)) for path in sorted(Path(sys.argv[1]).iterdir())]
     places: dict[str, list[list[float]]] = {}

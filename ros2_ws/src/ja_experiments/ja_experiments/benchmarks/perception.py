@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -29,7 +29,7 @@ from ja_common.core.geometry import angle_between, directions_of_rays
 from ja_common.core.posture import Posture
 from ja_common.detection_codec import encode_detections
 from ja_common.image_codec import decode_image, encode_image
-from ja_experiments.package_pictures import package_file, package_folder
+from ja_experiments.package_pictures import package_file, package_folder, package_picture
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.detector import DetectorConfig, Percept, SalientFeatureDetector
@@ -47,7 +47,7 @@ FRAME_NS = 33_333_333
 FEATURES = {'colour': (1.0, 0.0, 0.0), 'texture': (0.0, 1.0, 0.0), 'all': (1.0, 1.0, 1.0)}
 FACE_WIDTHS_PX = (30, 40, 60, 100, 200)
 SPEEDS_DEG_S = (10, 20, 40, 80)
-FINDERS = {
+FINDERS: dict[str, Callable[[], FaceFinder]] = {
     'blazeface': BlazeFace,
     'template': lambda: TemplateFaces(BlazeFace()),
     'haar': HaarFaces,
@@ -66,8 +66,8 @@ def speed(images: int = 300) -> dict[str, Row]:
 
     Processor time of one thread: what else the machine does is not counted.
     """
-    rows = {}
-    picture = cv2.imread(str(package_file('scikit-image', 'astronaut.png')), cv2.IMREAD_COLOR_RGB)
+    rows: dict[str, Row] = {}
+    picture = package_picture('scikit-image', 'astronaut.png')
     picture = picture[:384]
     for size in ((160, 120), (320, 240), (640, 480)):
         views = list(_shaken(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), images))
@@ -247,7 +247,7 @@ def _pictures() -> list[tuple[Picture, dict[str, Any]]]:
     found = []
     for package, pictures in _marks()['pictures'].items():
         for name, marks in pictures.items():
-            picture = cv2.imread(str(package_file(package, name)), cv2.IMREAD_COLOR_RGB)
+            picture = package_picture(package, name)
             scale = 640 / max(picture.shape[:2])
             how = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
             found.append((cv2.resize(picture, None, fx=scale, fy=scale, interpolation=how), marks))
@@ -256,9 +256,10 @@ def _pictures() -> list[tuple[Picture, dict[str, Any]]]:
 
 def _frames(clip: str) -> Iterator[Picture]:
     """Frames of 'package/name' in RGB; a still picture for ever, a clip from the start again."""
-    path = str(package_file(*clip.split('/')))
+    package, name = clip.split('/')
+    path = str(package_file(package, name))
     if not path.endswith(('.mp4', '.avi')):
-        picture = cv2.imread(path, cv2.IMREAD_COLOR_RGB)
+        picture = package_picture(package, name)
         while True:
             yield picture
     while True:
@@ -289,13 +290,11 @@ def _settled(picture: Picture, finder: FaceFinder, looks: int = 30) -> Percept:
 def _small_face_hits(width_px: int, places: int = 12) -> list[bool]:
     """The astronaut's head, scaled, at random places of a face-free street: is it found?"""
     rng = np.random.default_rng(width_px)
-    astronaut = cv2.imread(
-        str(package_file('scikit-image', 'astronaut.png')), cv2.IMREAD_COLOR_RGB
-    )
+    astronaut = package_picture('scikit-image', 'astronaut.png')
     head = astronaut[40:210, 140:310]
     scale = width_px / 94  # the width of the astronaut's face
     head = cv2.resize(head, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    street = cv2.imread(str(package_file('opencv-doc', 'building.jpg')), cv2.IMREAD_COLOR_RGB)
+    street = package_picture('opencv-doc', 'building.jpg')
     street = cv2.resize(street, (640, 480), interpolation=cv2.INTER_AREA)
     hits = []
     for _ in range(places):
