@@ -7,7 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
@@ -17,7 +16,6 @@ SOURCES = Path(__file__).parents[2] / 'ros2_ws' / 'src'
 IN_WORKSPACE = 'source install/setup.bash && exec "$@"'
 
 
-@pytest.mark.slow
 def test_a_node_of_the_built_workspace_runs(tmp_path, ros_context):
     colcon = shutil.which('colcon', path=Path(sys.executable).parent)
     assert colcon, 'colcon is not installed beside this Python'

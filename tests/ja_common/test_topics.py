@@ -5,7 +5,7 @@ from rclpy.qos import HistoryPolicy, QoSCompatibility, ReliabilityPolicy, qos_ch
 from rclpy.qos import qos_profile_sensor_data as best_effort_camera
 from rclpy.qos import qos_profile_system_default as reliable_camera
 
-from ja_common.topics import CLOCK, DIAGNOSTICS, IMAGE, JOINT_STATES, TOPICS
+from ja_common.topics import CLOCK, DIAGNOSTICS, IMAGE, JOINT_STATES, LOG, TOPICS
 
 by_name = pytest.mark.parametrize('topic', TOPICS, ids=lambda topic: topic.name)
 
@@ -17,7 +17,7 @@ def test_every_name_stands_once():
 
 @by_name
 def test_names_are_relative_so_that_namespaces_work(topic):
-    assert not topic.name.startswith('/') or topic in (CLOCK, DIAGNOSTICS)
+    assert not topic.name.startswith('/') or topic in (CLOCK, DIAGNOSTICS, LOG)
     assert topic.purpose
 
 
