@@ -87,17 +87,20 @@ def test_a_node_may_come_and_go(executor, node, ros_context):
     guest.destroy_node()
 
 
-def test_nodes_are_served_in_the_order_of_their_names(executor, ros_context):
-    order = []
-    for name in ('charlie', 'alpha', 'bravo'):
-        node = rclpy.create_node(name, context=ros_context)
-        node.create_subscription(Int32, 'number', lambda _, name=name: order.append(name), 10)
-        executor.add_node(node)
-    publisher = executor.get_nodes()[0].create_publisher(Int32, 'number', 10)
-    spin_until(executor, lambda: publisher.get_subscription_count() == 3)
-    publisher.publish(Int32())
-    spin_until(executor, lambda: len(order) == 3)
-    assert order == ['alpha', 'bravo', 'charlie']
+def test_messages_are_served_in_the_order_in_which_they_were_said(executor, node):
+    names, order = ['bravo', 'charlie', 'alpha'], []
+    publishers = {}
+    for name in sorted(names):
+        node.create_subscription(Int32, name, lambda _, name=name: order.append(name), 10)
+        publishers[name] = node.create_publisher(Int32, name, 10)
+    spin_until(executor, lambda: all(p.get_subscription_count() for p in publishers.values()))
+    for _ in range(20):
+        order.clear()
+        for name in names:
+            publishers[name].publish(Int32())
+        spin_until(executor, lambda: len(order) == 3)
+        assert order == names
+        names.append(names.pop(0))
 
 
 def test_a_fault_of_a_callback_is_raised_and_one_that_waits_is_refused(executor, node):

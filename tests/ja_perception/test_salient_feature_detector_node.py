@@ -132,6 +132,18 @@ def test_header_goes_on_unchanged_and_empty_images_are_answered_too(rig):
     assert not rig.all_of(FACE_IMAGE)
 
 
+def test_image_sent_again_gets_the_same_answer_and_counts_once(rig):
+    for stamp_ns in (PERIOD_NS, 2 * PERIOD_NS):
+        rig.joints(stamp_ns)
+    for count, stamp_ns in enumerate([1, 1, 1, 2], start=1):
+        rig.image(stamp_ns * PERIOD_NS, caregiver_and_ball())
+        rig.answer(count)
+    first, second, third, fourth = rig.all_of(DETECTIONS)
+    assert bytes(first.data) == bytes(second.data) == bytes(third.data)
+    assert second.header == first.header
+    assert to_ns(fourth.header.stamp) == 2 * PERIOD_NS
+
+
 def test_attended_face_comes_with_its_picture(rig):
     rig.joints(PERIOD_NS)
     rig.image(PERIOD_NS, caregiver_and_ball())

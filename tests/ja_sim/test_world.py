@@ -246,6 +246,10 @@ def test_a_late_picture_shows_the_posture_of_its_stamp(make_world):
     late.step(0.22)
     assert late.observe().stamp_ns == prompt.observe().stamp_ns
     np.testing.assert_array_equal(late.observe().image, prompt.observe().image)
+    then, now = late.truth_at_exposure(), late.truth()
+    assert then.stamp_ns == late.observe().stamp_ns == prompt.truth().stamp_ns
+    np.testing.assert_array_equal(then.posture, prompt.truth().posture)
+    assert np.linalg.norm(now.posture - then.posture) > 0.05
 
 
 def test_exposure_blurs_brightens_and_adds_noise(make_world):

@@ -1,21 +1,23 @@
-"""A single-threaded executor that keeps its wait set from one wait to the next."""
+"""A single-threaded executor that keeps its wait set, and serves messages as they were said."""
 
+import inspect
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Coroutine, Iterator
+from functools import partial
+from operator import itemgetter
 from typing import Any
 
 from rclpy.context import Context
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, TimeoutObject
 from rclpy.impl.implementation_singleton import rclpy_implementation as implementation
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 from rclpy.waitable import NumberOfEntities
 
 _FOREVER_NS = -1
 # As rclpy's C++ names what can be waited for, in the order in which a node's are served.
 _KINDS = ('timer', 'subscription', 'guard_condition', 'client', 'service')
-
-Work = tuple[str, Any]
-"""Kind of an entity, and the entity."""
 
 
 class KeptWaitSetExecutor(SingleThreadedExecutor):
@@ -24,7 +26,11 @@ class KeptWaitSetExecutor(SingleThreadedExecutor):
     rclpy's collects all entities before every wait, wakes itself after every callback and wraps
     each in a task; for the whole graph in one process that takes longer than what the nodes
     compute (docs/ros_defaults.md). Here the entities are collected anew only when a node has made
-    or destroyed one, and nodes are served in the order of their names, in every run the same.
+    or destroyed one.
+
+    Messages that are ready together are served in the order in which they were published, on
+    whatever topics, so that a cause comes before its effects however late this process wakes:
+    without that no run of the graph would repeat another.
 
     In return, callbacks are plain functions, and entities are made and destroyed in the thread
     that spins. `spin_once` may return without having run a callback when the executor was woken.
@@ -32,7 +38,7 @@ class KeptWaitSetExecutor(SingleThreadedExecutor):
 
     def __init__(self, *, context: Context | None = None) -> None:
         self._wait_set: _WaitSet | None = None
-        self._ready: deque[Work] = deque()
+        self._ready: deque[Callable[[], Any]] = deque()
         super().__init__(context=context)
 
     def add_node(self, node: Node) -> bool:
@@ -68,8 +74,9 @@ class KeptWaitSetExecutor(SingleThreadedExecutor):
             if not wait_condition():
                 self._wait(timeout_sec)
         if self._ready:
-            kind, entity = self._ready.popleft()
-            _run(getattr(self, f'_take_{kind}')(entity))
+            outcome = self._ready.popleft()()
+            if inspect.iscoroutine(outcome):
+                _run(outcome)
 
     def _wait(self, timeout_sec: float | None) -> None:
         self._check_context()
@@ -78,7 +85,18 @@ class KeptWaitSetExecutor(SingleThreadedExecutor):
         forever = timeout_sec is None or timeout_sec < 0.0
         wait_set.wait(_FOREVER_NS if forever else int(1e9 * timeout_sec))  # type: ignore[operator]
         self._check_context()
-        self._ready.extend(wait_set.ready())
+        messages = []
+        for kind, entity in wait_set.ready():
+            if kind == 'subscription':
+                messages += _taken(entity)
+            else:
+                self._ready.append(partial(self._serve, kind, entity))
+        messages.sort(key=itemgetter(0))
+        self._ready.extend(call for _, call in messages)
+
+    def _serve(self, kind: str, entity: Any) -> Any:
+        work = getattr(self, f'_take_{kind}')(entity)
+        return None if work is None else work()
 
     def _check_context(self) -> None:
         if not self._context.ok():
@@ -142,8 +160,8 @@ class _WaitSet:
             waitable.add_to_wait_set(self._rcl)
         self._rcl.wait(timeout_ns)
 
-    def ready(self) -> Iterator[Work]:
-        """What there is to do after a wait."""
+    def ready(self) -> Iterator[tuple[str, Any]]:
+        """Kinds and entities that have something to do, after a wait."""
         for waitable in self._waitables:
             if waitable.is_ready(self._rcl):
                 yield 'waitable', waitable
@@ -153,12 +171,25 @@ class _WaitSet:
                 yield kind, entity
 
 
-def _run(work: Callable[[], Any] | None) -> None:
-    """Run what an entity had to do (None: nothing any more), a coroutine that must not wait."""
-    if work is None:
-        return
+def _taken(subscription: Subscription) -> list[tuple[int, Callable[[], Any]]]:
+    """The message of a subscription: when it was published [ns], and the call that serves it."""
     try:
-        work().send(None)
+        with subscription.handle:
+            taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+    except InvalidHandle:
+        return []  # destroyed meanwhile
+    if taken is None:
+        return []
+    message, information = taken
+    wants_both = subscription._callback_type is Subscription.CallbackType.WithMessageInfo
+    arguments = taken if wants_both else (message,)
+    return [(information['source_timestamp'], partial(subscription.callback, *arguments))]
+
+
+def _run(coroutine: Coroutine) -> None:
+    """Run a coroutine that has no need to wait."""
+    try:
+        coroutine.send(None)
     except StopIteration:
         return
     raise TypeError('a callback waits for something: this executor runs plain functions only')

@@ -164,7 +164,7 @@ class SimNode(GraphNode):
         now = self._header(self._world.now_ns).stamp
         return _Round(
             Clock(clock=now),
-            encode_truth(header, self._world.truth()),
+            encode_truth(header, self._world.truth_at_exposure()),
             joint_states,
             _camera_info(header, observation),
             encode_image(observation.image, header.stamp, CAMERA_FRAME),

@@ -62,13 +62,11 @@ class Truth:
 class _View:
     """All that one exposure depends on, so that a late picture shows the world as it was."""
 
-    stamp_ns: int
-    posture: np.ndarray
+    truth: Truth
     velocity: np.ndarray
     gaze: GazePose
     eyes_closed: bool
     things: list[Thing]
-    positions: np.ndarray
     hand: np.ndarray | None
 
 
@@ -163,17 +161,18 @@ class JointAttentionWorld:
         if not rate:
             self._film.append(self._view())
         seen_ns = end_ns - round(self.scene.head.camera_latency_s * 1e9)
-        while len(self._film) > 1 and self._film[1].stamp_ns <= seen_ns:
+        while len(self._film) > 1 and self._film[1].truth.stamp_ns <= seen_ns:
             self._film.popleft()
         self._sample = self._head.read_encoders(self._now_ns, self._encoder_rng)
 
     def observe(self) -> Observation:
         """The newest picture that has left the camera; its stamp is the time of exposure."""
         view = self._film[0]
-        if self._observation is None or self._observation.stamp_ns != view.stamp_ns:
+        stamp_ns = view.truth.stamp_ns
+        if self._observation is None or self._observation.stamp_ns != stamp_ns:
             sharp = self._draw(view)
             image = expose(sharp, view.velocity, self.intrinsics, self.scene.head, self._image_rng)
-            self._observation = Observation(image, view.stamp_ns, self.intrinsics)
+            self._observation = Observation(image, stamp_ns, self.intrinsics)
         return self._observation
 
     def picture(
@@ -196,7 +195,7 @@ class JointAttentionWorld:
         return self._sample
 
     def truth(self) -> Truth:
-        """For the scorer only."""
+        """How things are now; for the scorer only."""
         positions = self._positions()
         look = self._behaviour.look
         face = self._caregiver.face_position(self._gaze.pose(self._time_s, self._target_now()))
@@ -214,6 +213,10 @@ class JointAttentionWorld:
             in_view_at_look=self._in_view,
             posture=self._head.posture,
         )
+
+    def truth_at_exposure(self) -> Truth:
+        """How things were when the picture was taken that `observe` gives; for the scorer only."""
+        return self._film[0].truth
 
     def close(self) -> None:
         """Free the graphics context."""
@@ -297,13 +300,11 @@ class JointAttentionWorld:
 
     def _view(self) -> _View:
         return _View(
-            self._now_ns,
-            self._head.posture,
+            self.truth(),
             self._head.velocity,
             self._gaze.pose(self._time_s, self._target_now()),
             self._blinking.closed(self._time_s),
             self._arrangement.things,
-            self._positions(),
             self._hand(),
         )
 
@@ -312,8 +313,8 @@ class JointAttentionWorld:
         self._caregiver.place(data, view.gaze, view.eyes_closed)
         self._caregiver.reach(data, view.hand)
         self._objects.dress(view.things)
-        self._objects.place(data, view.positions)
-        rotation = head_rotation(view.posture)
+        self._objects.place(data, view.truth.positions)
+        rotation = head_rotation(view.truth.posture)
         mujoco.mju_mat2Quat(data.mocap_quat[self._camera_mocap], rotation.ravel())
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_camlight(self._model, data)

@@ -1,0 +1,82 @@
+"""Whatever the order of arrival, the order of action is one."""
+
+from itertools import permutations
+
+import pytest
+
+from ja_common.core.turns import Turns
+
+
+class Acted(list):
+    """What has acted, in order; `add('a', 3)` is a message of kind a about image 3."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._turns = Turns(['a', 'b'])
+
+    def add(self, kind: str, stamp: int) -> None:
+        self._turns.add(kind, stamp, lambda: self.append(f'{kind}{stamp}'))
+
+
+@pytest.fixture
+def acted() -> Acted:
+    return Acted()
+
+
+def test_in_order_nothing_waits(acted):
+    for stamp in (1, 2):
+        acted.add('a', stamp)
+        acted.add('b', stamp)
+        assert acted[-2:] == [f'a{stamp}', f'b{stamp}']
+
+
+@pytest.mark.parametrize('arrival', [*permutations(['b1', 'a2', 'b2'])])
+def test_any_order_of_arrival_gives_one_order_of_action(acted, arrival):
+    acted.add('a', 1)
+    for kind, stamp in arrival:
+        acted.add(kind, int(stamp))
+    assert acted == ['a1', 'b1', 'a2', 'b2']
+
+
+def test_an_answer_before_its_question_waits_from_the_first_image_on(acted):
+    acted.add('b', 1)
+    assert acted == []
+    acted.add('a', 1)
+    assert acted == ['a1', 'b1']
+
+
+def test_what_never_comes_holds_up_no_more_than_one_image(acted):
+    acted.add('a', 1)
+    acted.add('a', 2)
+    assert acted == ['a1'], 'b1 may still come'
+    acted.add('a', 3)
+    assert acted == ['a1', 'a2']
+    acted.add('b', 1)
+    assert acted == ['a1', 'a2', 'b1'], 'late, but not lost'
+    acted.add('b', 2)
+    assert acted[3:] == ['b2', 'a3']
+
+
+def test_an_answer_whose_question_never_comes_holds_up_nothing(acted):
+    for kind, stamp in (('a', 1), ('b', 1), ('b', 2), ('a', 3), ('b', 3)):
+        acted.add(kind, stamp)
+    assert acted == ['a1', 'b1', 'a3', 'b2', 'b3']
+
+
+def test_an_image_that_is_sent_again_waits_no_longer(acted):
+    acted.add('a', 1)
+    acted.add('a', 2)
+    acted.add('a', 2)
+    assert acted == ['a1', 'a2']
+
+
+def test_an_image_that_is_answered_again_acts_again(acted):
+    for kind in 'abab':
+        acted.add(kind, 1)
+    assert acted == ['a1', 'b1', 'a1', 'b1']
+
+
+def test_a_clock_that_is_set_back_begins_anew(acted):
+    for kind, stamp in (('a', 8), ('b', 8), ('a', 9), ('a', 1), ('b', 1), ('a', 2)):
+        acted.add(kind, stamp)
+    assert acted == ['a8', 'b8', 'a9', 'a1', 'b1', 'a2']
