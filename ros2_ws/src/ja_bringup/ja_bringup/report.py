@@ -29,7 +29,7 @@ def draw_png(curve: LearningCurve, folder: Path, window: int) -> Path:
     """Success rate of the recent trials and p(LM), over trials (as Figure 6 of the paper)."""
     path = folder / PNG_NAME
     trials = [record.trial for record in curve.records]
-    practice = [not record.stage.startswith('exam') for record in curve.records]
+    practice = [record.stage == 'practice' for record in curve.records]
     rates = np.where(practice, curve.recent_rates(window), np.nan)
     figure = Figure(figsize=(7, 4), layout='constrained')
     FigureCanvasAgg(figure)
