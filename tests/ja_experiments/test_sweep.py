@@ -83,7 +83,7 @@ def test_a_killed_worker_and_a_killed_sweep_lose_only_what_they_were_at(
 ) -> None:
     grid = read_grid(grid_file(tmp_path, seeds=4))
     with LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address='127.0.0.1:0'
     ) as cluster:
         address = cluster.scheduler_address
         child = multiprocessing.get_context('spawn').Process(
@@ -118,7 +118,7 @@ def test_only_missing_cells_are_run_and_other_looks_are_other_cells(
     tmp_path: Path, materials: Materials
 ) -> None:
     with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address='127.0.0.1:0'
     ) as cluster:
         address = cluster.scheduler_address
         small = read_grid(grid_file(tmp_path, seeds=1))

@@ -53,7 +53,7 @@ class Plan:
 
     trials: int = TRIALS
     seeds: tuple[int, ...] = tuple(range(SEEDS))
-    test_trials: int = 5000
+    test_trials: int = 2000
 
     @property
     def block(self) -> int:
