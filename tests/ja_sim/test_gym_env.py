@@ -1,5 +1,8 @@
 """The Gymnasium environment: its own checker passes, and the reward says what it should."""
 
+import subprocess
+import sys
+
 import gymnasium
 import numpy as np
 import pytest
@@ -58,3 +61,9 @@ def test_each_episode_is_another_look_in_the_same_world(env):
     _, second = env.reset()
     assert (first['trial'], second['trial']) == (1, 2)
     assert ja_sim.gym_env.ENV_ID in gymnasium.registry
+
+
+def test_a_process_that_knows_nothing_of_it_finds_it_by_its_module():
+    code = "import gymnasium; gymnasium.make('ja_sim.gym_env:JointAttention-v0', scene='easy')"
+    ran = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stderr

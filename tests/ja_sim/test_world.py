@@ -1,5 +1,7 @@
 """The world as the robot meets it: through pictures, encoders and commands."""
 
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -378,3 +380,19 @@ def test_osmesa_is_the_fallback(monkeypatch):
     only_osmesa = {'OSMesa': 'libOSMesa.so.8'}
     monkeypatch.setattr(graphics.ctypes.util, 'find_library', only_osmesa.get)
     assert graphics.backend() == 'osmesa'
+
+
+def test_a_world_that_nobody_closed_ends_without_complaint():
+    """Also where another library registered finalizers first: they run in the reverse order."""
+    code = (
+        'import weakref\n'
+        'from ja_sim.core.scene import load_scene\n'
+        'from ja_sim.core.world import JointAttentionWorld\n'
+        'class Other: pass\n'
+        'other = Other()\n'
+        'weakref.finalize(other, id, None)\n'
+        "world = JointAttentionWorld(load_scene('easy'), 0, (32, 24))\n"
+        'world.observe()\n'
+    )
+    ran = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (0, '')

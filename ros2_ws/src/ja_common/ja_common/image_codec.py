@@ -142,12 +142,18 @@ def encode_image(pixels: np.ndarray, stamp: Time, frame_id: str) -> Image:
     return msg
 
 
-def encode_camera_info(header: Header, width: int, height: int, focal_px: float) -> CameraInfo:
-    """Calibration of an ideal camera: square pixels, axis through the centre, no distortion."""
+def encode_camera_info(
+    header: Header, width: int, height: int, fx: float, fy: float | None = None
+) -> CameraInfo:
+    """Calibration of an ideal camera: axis through the centre, no distortion.
+
+    `fx`, `fy`: focal lengths [px]; the pixels are square where only one is given.
+    """
+    fy = fx if fy is None else fy
     cx, cy = (width - 1) / 2, (height - 1) / 2
     info = CameraInfo(header=header, width=width, height=height)
     info.distortion_model, info.d = 'plumb_bob', [0.0] * 5
-    info.k = [focal_px, 0.0, cx, 0.0, focal_px, cy, 0.0, 0.0, 1.0]
+    info.k = [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]
     info.r = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-    info.p = [focal_px, 0.0, cx, 0.0, 0.0, focal_px, cy, 0.0, 0.0, 0.0, 1.0, 0.0]
+    info.p = [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]
     return info

@@ -1,7 +1,10 @@
 """The world as a Gymnasium environment, so that others' learners can be tried on it.
 
-    import gymnasium, ja_sim.gym_env
-    env = gymnasium.make('JointAttention-v0', scene='easy')
+    import gymnasium
+    env = gymnasium.make('ja_sim.gym_env:JointAttention-v0', scene='easy')
+
+(Gymnasium 1 finds no environments by itself: it imports the module before the colon. After that
+`JointAttention-v0` alone will do.)
 
 An episode is one trial. It begins when the caregiver has turned to an object; each action shifts
 the head; it ends when an object stands in the centre. The reward is 1 if that is the object she

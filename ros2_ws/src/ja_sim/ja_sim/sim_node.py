@@ -17,7 +17,7 @@ from ja_common.core.config import ConfigError, parameter
 from ja_common.core.health import Level
 from ja_common.core.stamps import NS_PER_S
 from ja_common.graph_node import GraphNode, spin_node
-from ja_common.image_codec import encode_image
+from ja_common.image_codec import encode_camera_info, encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import (
@@ -30,7 +30,7 @@ from ja_common.topics import (
 )
 from ja_sim.core.pace import Pace
 from ja_sim.core.scene import load_scene
-from ja_sim.core.world import JointAttentionWorld, Observation
+from ja_sim.core.world import JointAttentionWorld
 from ja_sim.truth_codec import encode_truth
 
 CAMERA_FRAME = 'camera_optical_frame'
@@ -160,13 +160,14 @@ class SimNode(GraphNode):
                 self._joints.encode_posture(header, sample.position, sample.velocity)
             )
         observation = self._world.observe()
+        lens = observation.intrinsics
         header = self._header(observation.stamp_ns, CAMERA_FRAME)
         now = self._header(self._world.now_ns).stamp
         return _Round(
             Clock(clock=now),
             encode_truth(header, self._world.truth_at_exposure()),
             joint_states,
-            _camera_info(header, observation),
+            encode_camera_info(header, lens.width, lens.height, lens.fx, lens.fy),
             encode_image(observation.image, header.stamp, CAMERA_FRAME),
         )
 
@@ -246,21 +247,6 @@ class SimNode(GraphNode):
         self.health.values['objects'] = str(scene.objects.count)
         size = (self._config.image_width, self._config.image_height)
         return JointAttentionWorld(scene, self._config.seed, image_size=size)
-
-
-def _camera_info(header: Header, observation: Observation) -> CameraInfo:
-    lens = observation.intrinsics
-    fx, fy, cx, cy = lens.fx, lens.fy, lens.cx, lens.cy
-    return CameraInfo(
-        header=header,
-        width=lens.width,
-        height=lens.height,
-        distortion_model='plumb_bob',
-        d=[0.0] * 5,
-        k=[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
-        r=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        p=[fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
-    )
 
 
 def main(args: list[str] | None = None) -> None:

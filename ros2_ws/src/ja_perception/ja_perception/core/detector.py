@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ja_common.core.config import parameter
 from ja_common.core.detection import Detection, Kind, most_salient
 from ja_common.core.fixation import WIDTH_SIXTH, stands_in_centre
-from ja_common.core.posture import Posture
+from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_perception.core.box import Box
 from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.face_crop import FACE_COLUMNS, FACE_ROWS, crop_face
@@ -31,7 +31,7 @@ class AttentionConfig:
         low=0.0, high=1.0,
     )  # fmt: skip
     still_below_rad_s: float = parameter(
-        0.02, 'the head is still when both joints are slower', low=0.0, high=10.0
+        STILL_BELOW_RAD_S, 'the head is still when both joints are slower', low=0.0, high=10.0
     )
     crop_widths: float = parameter(
         1.5, 'width of the face image (in widths of the face)', low=0.5, high=5.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import importlib
 import weakref
 from typing import Any
@@ -50,8 +51,11 @@ class Renderer:
         self._image = np.empty((height, width, 3), np.uint8)
         self._gl = _make_context(width, height)
         self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50)
-        # Also at exit, while OpenGL can still be called.
         self._free = weakref.finalize(self, _free, self._context, self._gl)
+        # At exit before MuJoCo's bindings shut OpenGL down, as only what was registered after them
+        # is; finalizers of their own accord run when the first of any library was registered.
+        self._free.atexit = False
+        atexit.register(self._free)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
         self._scene = mujoco.MjvScene(model, maxgeom=1000)
         self._options = mujoco.MjvOption()
@@ -82,6 +86,7 @@ class Renderer:
     def close(self) -> None:
         """Give the graphics memory back."""
         self._free()
+        atexit.unregister(self._free)
 
 
 def _free(context: mujoco.MjrContext, gl: Any) -> None:
