@@ -29,37 +29,49 @@ def run() -> dict[str, Row]:
     """Lockstep in both compositions, then real time at the camera's rate for the latencies."""
     rows: dict[str, Row] = {}
     for name, one_process in (('many processes', False), ('one process', True)):
-        watcher = _Watch(one_process)
-        rows |= {f'{figure}, {name}': row for figure, row in watcher.rates().items()}
+        rates = lockstep_rates(sim_graph(), one_process)
+        rows |= {f'{figure}, {name}': row for figure, row in rates.items()}
     return rows | _latencies()
+
+
+def lockstep_rates(graph: Sequence[NodeSpec], one_process: bool) -> dict[str, Row]:
+    """Image steps and trials a second of a graph, and the time to its first command.
+
+    Also the processor time of this process for an image: what the graph costs if it is all here.
+    """
+    return _Watch(graph, one_process).rates()
 
 
 class _Watch:
     """One lockstep run, and the times at which images and trials were finished."""
 
-    def __init__(self, one_process: bool) -> None:
+    def __init__(self, graph: Sequence[NodeSpec], one_process: bool) -> None:
         self._began_s = time.monotonic()
-        self._images: list[tuple[float, int, int]] = []
-        _run(sim_graph(), self._sample, one_process)
+        self._images: list[tuple[float, float, int, int]] = []
+        run_for_benchmark(graph, self._sample, one_process)
 
     def _sample(self, node: ProgressNode) -> bool:
         if node.images and not self._images:
             self._first_image_s = time.monotonic()
         if node.images:
-            sample = (time.monotonic(), node.images, len(node.curve.records))
-            self._images.append(sample)
+            self._images.append(
+                (time.monotonic(), time.process_time(), node.images, len(node.curve.records))
+            )
         return node.elapsed_s > WARM_UP_S + MEASURE_S
 
     def rates(self) -> dict[str, Row]:
         """Rates over blocks of time after the warm-up, and the time to the first answer."""
-        times, images, trials = np.array(self._images).T
+        times, busy, images, trials = np.array(self._images).T
         warm = times > self._first_image_s + WARM_UP_S
-        times, images, trials = times[warm], images[warm], trials[warm]
+        times, busy, images, trials = times[warm], busy[warm], images[warm], trials[warm]
         # One edge a block; a block's rate is a sample.
         edges = np.searchsorted(times, np.arange(times[0], times[-1], BLOCK_S))
         seconds = np.diff(times[edges])
         return {
             'image steps': row(np.diff(images[edges]) / seconds, 'images/s'),
+            'processor time of this process': row(
+                1e3 * np.diff(busy[edges]) / np.diff(images[edges]), 'ms/image'
+            ),
             'trials': row(np.diff(trials[edges]) / seconds, 'trials/s'),
             'start to first command': {
                 'value': self._first_image_s - self._began_s,
@@ -105,13 +117,14 @@ class _Stopwatch:
 def _latencies() -> dict[str, Row]:
     stopwatch = _Stopwatch()
     graph = with_arguments(sim_graph(), ['-p', 'lockstep:=false'])
-    _run(graph, stopwatch.tick, one_process=False)
+    run_for_benchmark(graph, stopwatch.tick, one_process=False)
     return {f'{name}, 10 Hz, many processes': row for name, row in stopwatch.rows().items()}
 
 
-def _run(
+def run_for_benchmark(
     graph: Sequence[NodeSpec], done: Callable[[ProgressNode], bool], one_process: bool
 ) -> None:
+    """Run a graph until `done`. Raises ConfigError when it ends before."""
     with TemporaryDirectory() as folder:
         code, _ = run_graph(graph, Path(folder), 'bench graph', done, one_process=one_process)
     if code:
