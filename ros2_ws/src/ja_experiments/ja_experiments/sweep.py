@@ -178,7 +178,10 @@ def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
         return
     with (
         LocalCluster(
-            n_workers=workers, threads_per_worker=1, dashboard_address='127.0.0.1:0'
+            n_workers=workers,
+            threads_per_worker=1,
+            dashboard_address='127.0.0.1:0',
+            silence_logs='ERROR',
         ) as cluster,
         Client(cluster) as client,
     ):
