@@ -1,4 +1,4 @@
-"""Does the graph's memory stay flat? Resident memory of the whole graph over many lockstep steps."""
+"""Does memory stay flat? Resident memory of the whole graph over many lockstep steps."""
 
 import os
 from pathlib import Path
