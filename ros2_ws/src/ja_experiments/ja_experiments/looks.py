@@ -82,9 +82,12 @@ def load_looks(
     kept = (folder or cache_folder()) / f'looks-{Path(scene).stem}-{seed}-{count}'
     maker = _maker(scene, seed, count)
     try:
-        return _read(kept, maker)
+        looks = _read(kept, maker)
     except _NotUsableError as why:
         say(f'Rendering {count} looks at the caregiver ({why}).')
+    else:
+        progress(count)
+        return looks
     looks = _render(scene, seed, count, progress)
     _write(kept, maker, looks)
     return looks
