@@ -137,12 +137,17 @@ def test_same_seed_and_commands_give_the_same_pictures_also_after_a_reset(make_r
 def test_encoders_may_be_read_several_times_an_image(make_rig):
     rig = make_rig(joint_states_per_image=4)
     rig.step(0.1, 0.0)
-    before = stamp(rig.image)
-    rig.step(0.1, 0.0)
     heard = rig.bench.heard(JOINT_STATES)
-    rig.bench.wait(lambda: stamp(heard[-1]) == stamp(rig.image))
-    stamps = {stamp(message) for message in heard if stamp(message) > before}
-    assert sorted(stamps) == [before + i * PERIOD_NS // 4 for i in (1, 2, 3, 4)]
+    for _ in range(10):  # sensors are heard best-effort: on a busy machine some get lost
+        before = stamp(rig.image)
+        rig.step(0.1, 0.0)
+        rig.bench.wait(lambda: stamp(heard[-1]) == stamp(rig.image))
+        stamps = {stamp(message) for message in heard if stamp(message) > before}
+        wanted = {before + i * PERIOD_NS // 4 for i in (1, 2, 3, 4)}
+        assert stamps <= wanted
+        if stamps == wanted:
+            return
+    pytest.fail('never were four joint states heard of one image')
 
 
 def test_real_time_needs_no_command(make_rig):
