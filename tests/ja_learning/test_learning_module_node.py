@@ -40,10 +40,7 @@ class Life:
         return self._see(self._tick(pan, velocity=[0.5, 0.0]), [])
 
     def fixate(self, pan, direction):
-        self.rest(pan)
-        before = self.bench.received(FIXATION)
-        self.bench.say(FIXATION, joint_state(self.ms * MS, *direction))
-        self.bench.wait(lambda: self.bench.received(FIXATION) > before)
+        self._see(self._tick(pan), [], direction)
 
     def trial(self, direction=(0.4, 0.1)):
         """A whole trial: look, one shift, fixation."""
@@ -61,11 +58,17 @@ class Life:
         self.bench.say_posture(self.ms * MS, pan, **more)
         return self.ms * MS
 
-    def _see(self, stamp_ns, detections):
+    def _see(self, stamp_ns, detections, fixation=()):
         self.bench.say(DETECTIONS, encode_detections(header(stamp_ns), detections))
         answer = self.bench.next(LM_DELTA)
         assert answer.header == header(stamp_ns)
+        self._say_fixation(stamp_ns, fixation)
         return answer
+
+    def _say_fixation(self, stamp_ns, direction):
+        before = self.bench.received(FIXATION)
+        self.bench.say(FIXATION, joint_state(stamp_ns, *direction))
+        self.bench.wait(lambda: self.bench.received(FIXATION) > before)
 
 
 @pytest.fixture
@@ -253,9 +256,11 @@ def test_the_belief_is_told_to_who_looks(make_bench, learner, samples):
     bench = make_bench(LearningModuleNode, SAYS, [LM_DELTA, BELIEF], learner=learner)
     life = Life(bench)
     life.rest(0.0)
-    assert bench.next(BELIEF).width == 0, 'no trial is under way'
     life.look(pan=0.1)
-    told = decode_columns(bench.next(BELIEF), ('pan', 'tilt', 'weight'))
+    bench.wait(lambda: len(bench.heard(BELIEF)) == 2)
+    before, looking = bench.heard(BELIEF)
+    assert before.width == 0, 'no trial is under way'
+    told = decode_columns(looking, ('pan', 'tilt', 'weight'))
     assert len(told['pan']) == samples
     assert told['weight'].sum() == pytest.approx(1.0, abs=1e-5)
     assert np.mean(told['pan']) == pytest.approx(0.1, abs=0.1), 'an untaught belief is about her'

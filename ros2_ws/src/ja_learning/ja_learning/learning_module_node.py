@@ -1,5 +1,6 @@
 """`learning_module`: proposes where to look from the caregiver's face, and learns it online."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,6 +16,7 @@ from ja_common.core.detection import caregiver_face, objects
 from ja_common.core.geometry import directions_of_rays
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_common.core.stamp_join import StampJoin
+from ja_common.core.turns import Turns
 from ja_common.detection_codec import decode_detections
 from ja_common.graph_node import GraphNode, spin_node
 from ja_common.image_codec import decode_image
@@ -62,6 +64,8 @@ class LearningModuleNode(GraphNode):
         self._trial = TrialRecorder()
         self._postures = PostureListener(self, self._joints)
         self._attended = StampJoin([FACE_IMAGE.name, DETECTIONS.name])
+        # First the proposal for an image, then its lesson, and only then the next proposal.
+        self._turns = Turns([DETECTIONS.name, FIXATION.name])
         self.hear(FACE_IMAGE, self._on_face_image)
         self.hear(DETECTIONS, self._on_detections, expected_every_s=2.0)
         self.hear(FIXATION, self._on_fixation, expected_every_s=2.0)
@@ -97,14 +101,23 @@ class LearningModuleNode(GraphNode):
             self._when_attended(DETECTIONS.name, message.header, rays)
         else:
             propose = partial(self._propose, message.header, rays, None)
-            self._postures.when_known(to_ns(message.header.stamp), propose)
+            self._in_turn(DETECTIONS.name, message.header, propose)
 
     def _when_attended(self, key: str, header: Header, value: Any) -> None:
         both = self._attended.add(key, to_ns(header.stamp), value)
         if both is not None:
             rays, face = both[DETECTIONS.name], both[FACE_IMAGE.name]
             propose = partial(self._propose, header, rays, face)
-            self._postures.when_known(to_ns(header.stamp), propose)
+            self._in_turn(DETECTIONS.name, header, propose)
+
+    def _in_turn(self, kind: str, header: Header, action: Callable[[Posture], None]) -> None:
+        """Act with the posture at the stamp, when all that comes first has acted."""
+        stamp_ns = to_ns(header.stamp)
+
+        def take_turn(posture: Posture) -> None:
+            self._turns.add(kind, stamp_ns, partial(action, posture))
+
+        self._postures.when_known(stamp_ns, take_turn)
 
     def _propose(
         self, header: Header, rays: np.ndarray, face: np.ndarray | None, posture: Posture
@@ -136,12 +149,12 @@ class LearningModuleNode(GraphNode):
         self._belief.publish(encode_columns(header, columns))
 
     def _on_fixation(self, message: JointState) -> None:
-        direction = self._joints.decode(message)
-        if direction is not None:
-            learn = partial(self._learn, direction)
-            self._postures.when_known(to_ns(message.header.stamp), learn)
+        learn = partial(self._learn, self._joints.decode(message))
+        self._in_turn(FIXATION.name, message.header, learn)
 
-    def _learn(self, direction: np.ndarray, posture: Posture) -> None:
+    def _learn(self, direction: np.ndarray | None, posture: Posture) -> None:
+        if direction is None:
+            return
         trial = self._trial.fixate(posture.position, direction)
         if trial is None or not self._learning:
             return
