@@ -1,10 +1,13 @@
 """The fast learner: its belief by numbers, and what it learns without being told."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
 
-from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner, GazeLineNetwork
+from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
+from ja_learning.core.gaze_line_network import GazeLineNetwork, give_member
 from ja_learning.core.learner import LearnerChoice, make_learner
 from ja_learning.core.network import NetworkConfig
 from ja_learning.core.trial import Trial
@@ -25,7 +28,9 @@ def lived_trial(rng: np.random.Generator, objects: int = 4) -> tuple[Trial, int]
     places = rng.uniform([-0.6, -0.25], [0.6, 0.25], (objects, 2))
     meant, fixated = rng.integers(objects, size=2)
     return (
-        Trial(drawn_face(places[meant]), LOOK[None], LOOK + places[fixated], LOOK + places),
+        Trial(
+            drawn_face(places[meant]), LOOK[None], LOOK + places[fixated], LOOK + places, objects
+        ),
         int(meant),
     )
 
@@ -42,11 +47,11 @@ def share_right(learner: GazeLineLearner, rng: np.random.Generator, trials: int 
 
 @pytest.fixture
 def learner() -> GazeLineLearner:
-    return GazeLineLearner(GazeLineConfig(channels=4), seed=3)
+    return GazeLineLearner(GazeLineConfig(members=3, channels=4), seed=3)
 
 
 def test_a_mirrored_face_gives_mirrored_pan_and_equal_tilt():
-    network = GazeLineNetwork(channels=4)
+    network = GazeLineNetwork(members=2, channels=4)
     faces = torch.randn(5, 1, 30, 25)
     with torch.no_grad():
         gaze, mirrored = network.gaze(faces), network.gaze(faces.flip(-1))
@@ -54,12 +59,26 @@ def test_a_mirrored_face_gives_mirrored_pan_and_equal_tilt():
 
 
 def test_the_belief_is_a_density():
-    network = GazeLineNetwork(channels=4)
+    network = GazeLineNetwork(members=2, channels=4)
     grid = torch.linspace(-4, 4, 401)
-    places = torch.stack(torch.meshgrid(grid, grid, indexing='ij'), -1).reshape(1, -1, 2)
+    places = torch.stack(torch.meshgrid(grid, grid, indexing='ij'), -1).reshape(1, 1, -1, 2)
     with torch.no_grad():
-        density = network.log_density(torch.tensor([[0.6, -0.3]]), places).exp()
-    assert float(density.sum()) * 0.02**2 == pytest.approx(1.0, abs=1e-3)
+        density = network.log_density(torch.tensor([[[0.6, -0.3]], [[0.1, 0.5]]]), places).exp()
+    assert density.shape[:2] == (2, 1)
+    assert density.sum(-1).flatten().numpy() * 0.02**2 == pytest.approx([1.0, 1.0], abs=1e-3)
+
+
+def test_members_do_not_depend_on_each_other():
+    network = GazeLineNetwork(members=3, channels=4)
+    faces = torch.randn(2, 1, 30, 25)
+    with torch.no_grad():
+        before = network.gaze(faces)
+        for parameter in network.parameters():
+            give_member(parameter, 3, giver=0, taker=2)
+        after = network.gaze(faces)
+    assert torch.equal(before[:2], after[:2])
+    assert torch.allclose(after[2], before[0], atol=1e-6)
+    assert not torch.allclose(before[2], before[0], atol=1e-3)
 
 
 def test_samples_of_the_belief_are_as_its_density_says(learner):
@@ -68,16 +87,18 @@ def test_samples_of_the_belief_are_as_its_density_says(learner):
     assert samples.shape == (4000, 2)
     # E[-log p] of a density's own samples is its entropy: the same from two independent halves,
     # and lower than that of the samples moved aside.
-    entropy = [-learner.log_density(face, LOOK, half).mean() for half in np.split(samples, 2)]
+    halves = np.split(samples, 2)
+    entropy = [-learner.log_density(face[None], LOOK, half).mean() for half in halves]
     assert entropy[0] == pytest.approx(entropy[1], abs=0.1)
-    assert -learner.log_density(face, LOOK, samples + 0.1).mean() > np.mean(entropy) + 0.3
+    aside = learner.log_density(face[None], LOOK, samples + 0.1)
+    assert -aside.mean() > np.mean(entropy) + 0.3
 
 
 def test_depth_is_uncertain_along_the_line_of_gaze_and_not_across():
-    network = GazeLineNetwork(channels=4)
-    gaze = torch.tensor([[0.5, 0.2]])
-    along = gaze[:, None] * torch.tensor([0.5, 1.0, 1.8])[:, None]
-    across = gaze[:, None] + torch.tensor([[[-0.25, 0.6]]])
+    network = GazeLineNetwork(members=1, channels=4)
+    gaze = torch.tensor([[[0.5, 0.2]]])
+    along = gaze[:, :, None] * torch.tensor([0.5, 1.0, 1.8])[:, None]
+    across = gaze[:, :, None] + torch.tensor([-0.25, 0.6])
     with torch.no_grad():
         assert network.log_density(gaze, along).min() > network.log_density(gaze, across).max() + 5
 
@@ -89,11 +110,45 @@ def test_it_learns_which_object_was_meant_though_nobody_tells(learner):
         learner.learn(lived_trial(rng)[0])
     assert before < 0.5
     assert share_right(learner, rng) > 0.85
+    assert learner.log_evidence > 20
+
+
+def test_faces_that_tell_nothing_give_no_evidence(learner):
+    rng = np.random.default_rng(6)
+    highest = 0.0
+    for _ in range(120):
+        trial, _ = lived_trial(rng)
+        other, _ = lived_trial(rng)
+        learner.learn(dataclasses.replace(trial, face=other.face))
+        highest = max(highest, learner.log_evidence)
+    assert learner.trials == 120
+    assert highest < np.log(20)
+
+
+def test_a_snapshot_stays_as_it_was_while_the_learner_goes_on(learner):
+    rng = np.random.default_rng(7)
+    face, places = drawn_face(np.array([0.3, 0.1])), LOOK + rng.uniform(-0.5, 0.5, (4, 2))
+    snapshot = learner.snapshot()
+    before = snapshot.log_density(face[None], LOOK, places)
+    assert np.array_equal(before, learner.log_density(face[None], LOOK, places))
+    for _ in range(20):
+        learner.learn(lived_trial(rng)[0])
+    assert np.array_equal(before, snapshot.log_density(face[None], LOOK, places))
+    assert not np.allclose(before, learner.log_density(face[None], LOOK, places))
+
+
+def test_without_top_down_attention_the_best_guess_is_proposed_whatever_stands_there():
+    both = [GazeLineLearner(GazeLineConfig(members=2, top_down=on), 5) for on in (False, True)]
+    face = drawn_face(np.array([0.3, 0.1]))
+    guess = both[0].propose(face, LOOK, LOOK, np.empty((0, 2)))
+    near = [LOOK + guess + 0.01]
+    assert both[0].propose(face, LOOK, LOOK, near) == pytest.approx(guess)
+    assert both[1].propose(face, LOOK, LOOK, near) == pytest.approx(guess + 0.01)
 
 
 def test_what_was_fixated_changes_nothing():
     """Neither right nor wrong reaches it: all that was seen counts alike."""
-    learners = [GazeLineLearner(GazeLineConfig(channels=4), seed=1) for _ in range(2)]
+    learners = [GazeLineLearner(GazeLineConfig(members=3, channels=4), seed=1) for _ in range(2)]
     rng = np.random.default_rng(1)
     for _ in range(5):
         trial, meant = lived_trial(rng)
@@ -125,7 +180,7 @@ def test_a_restored_learner_goes_on_bit_for_bit(learner):
     rng = np.random.default_rng(2)
     for _ in range(6):
         learner.learn(lived_trial(rng)[0])
-    again = GazeLineLearner(GazeLineConfig(channels=4), seed=99)
+    again = GazeLineLearner(GazeLineConfig(members=3, channels=4), seed=99)
     again.restore(learner.state())
     for _ in range(3):
         trial, _ = lived_trial(rng)
@@ -141,8 +196,9 @@ def test_a_restored_learner_goes_on_bit_for_bit(learner):
     [
         (lambda s: s.pop('faces'), 'faces'),
         (lambda s: s.update({'network.coder.0.weight': np.zeros((1, 1))}), 'must have shape'),
-        (lambda s: s.update({'mean.stretch_logits': np.full(9, np.nan)}), 'not finite'),
+        (lambda s: s.update({'mean.stretch_logits': np.full((3, 9), np.nan)}), 'not finite'),
         (lambda s: s.update({'candidate_counts': np.array([7])}), 'do not fit'),
+        (lambda s: s.update({'evidence.nats': np.zeros(9)}), 'evidence'),
     ],
 )
 def test_another_learners_state_is_refused_and_changes_nothing(learner, spoil, why):

@@ -91,3 +91,17 @@ def test_forgotten_trial_is_over(recorder):
 def test_picture_that_is_no_face_is_refused(recorder, face):
     with pytest.raises(ValueError, match='30 rows x 25 columns'):
         recorder.look(face, CAREGIVER)
+
+
+def test_a_trial_knows_what_was_seen_before_anybody_acted_on_the_face(recorder):
+    recorder.look(FACE, CAREGIVER)
+    recorder.see([(0.3, 0.0)])
+    recorder.rest(FIRST)
+    recorder.see([(0.3, 0.0), (-0.4, 0.1)])
+    recorder.shift()
+    recorder.see([BALL])
+    trial = recorder.fixate(SECOND, BALL)
+    assert trial.seen_before_shift == 2
+    assert trial.candidates == pytest.approx(np.array([(0.3, 0.0), (-0.4, 0.1), BALL]))
+    recorder.look(FACE, CAREGIVER)
+    assert recorder.fixate(SECOND, BALL).seen_before_shift == 0

@@ -12,15 +12,12 @@ from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
 from ja_learning.core.trial import Trial
 
 
-class Learner(Protocol):
-    """Proposes where to look from what was seen, and learns from whole trials."""
+class Predictor(Protocol):
+    """What had been learned at one instant; asking changes nothing, and any thread may ask."""
 
     @property
-    def kind(self) -> str:
-        """Name of the learner, as in `LearnerChoice`."""
-
-    trials: int
-    last_error_rad: float
+    def log_evidence(self) -> float:
+        """Evidence [nats] that the face tells this learner something; 0 at first (`evidence`)."""
 
     def propose(
         self, face: ArrayLike, look: ArrayLike, posture: ArrayLike, candidates: ArrayLike
@@ -34,10 +31,36 @@ class Learner(Protocol):
     def belief(
         self, face: ArrayLike, look: ArrayLike, rng: np.random.Generator, count: int
     ) -> NDArray[np.float64]:
-        """Directions (n, 2) [rad] drawn from the belief about what she means; n <= count."""
+        """Directions (count, 2) [rad] drawn from the belief about what she means."""
+
+    def log_density(
+        self, faces: ArrayLike, look: ArrayLike, directions: ArrayLike
+    ) -> NDArray[np.float64]:
+        """log p [of 1 / rad^2] of directions (m, 2) [rad] given each of faces (n, 30, 25): (n, m).
+
+        All faces as if seen from the posture `look` (2,) [rad].
+        """
+
+
+class Learner(Predictor, Protocol):
+    """Proposes where to look from what was seen, and learns from whole trials."""
+
+    @property
+    def kind(self) -> str:
+        """Name of the learner, as in `LearnerChoice`."""
+
+    @property
+    def config(self) -> Any:
+        """The dataclass with all its numbers."""
+
+    trials: int
+    last_error_rad: float
 
     def learn(self, trial: Trial) -> None:
         """Take in a finished trial."""
+
+    def snapshot(self) -> Predictor:
+        """A copy of what is believed now."""
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Everything that learning has changed, as named arrays."""

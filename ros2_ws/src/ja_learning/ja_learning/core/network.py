@@ -1,5 +1,6 @@
 """The learning module of the paper: a 752-7-2 network that learns online by back-propagation."""
 
+import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,6 +9,7 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 
 from ja_common.core.config import parameter
+from ja_learning.core.evidence import Evidence
 from ja_learning.core.trial import FACE_SHAPE, Trial
 
 INPUTS = FACE_SHAPE[0] * FACE_SHAPE[1] + 2
@@ -39,6 +41,12 @@ class NetworkConfig:
     initial_weight: float = parameter(
         0.05, 'weights start uniformly within +- this', low=0.0, high=10.0
     )
+    believed_within_rad: float = parameter(
+        0.15,
+        'standard deviation of the belief about what she means, around the one direction that the '
+        'network proposes: nothing in the paper, and nothing in its learning, depends on it',
+        low=0.01, high=3.15,
+    )  # fmt: skip
 
 
 class ThreeLayerNetwork:
@@ -66,6 +74,7 @@ class ThreeLayerNetwork:
         self._optimiser = torch.optim.SGD(
             self._parameters.values(), lr=config.learning_rate, momentum=config.momentum
         )
+        self._evidence = Evidence()
         self.trials = 0
         self.last_error_rad = float('nan')
 
@@ -84,11 +93,36 @@ class ThreeLayerNetwork:
     def belief(
         self, face: ArrayLike, look: ArrayLike, rng: np.random.Generator, count: int
     ) -> NDArray[np.float64]:
-        """The one direction that it proposes from the look, (1, 2) [rad]: it knows no doubt."""
-        return (np.asarray(look, float) + self.predict(face, look))[np.newaxis]
+        """Directions (count, 2) [rad] about the one that it proposes from the look."""
+        off = self.config.believed_within_rad * rng.standard_normal((count, 2))
+        return np.asarray(look, float) + self.predict(face, look) + off
+
+    def log_density(
+        self, faces: ArrayLike, look: ArrayLike, directions: ArrayLike
+    ) -> NDArray[np.float64]:
+        """log p [of 1 / rad^2] of directions (m, 2) given each of faces (n, 30, 25): (n, m)."""
+        look, variance = np.asarray(look, float), self.config.believed_within_rad**2
+        proposed = look + self.predict(faces, np.broadcast_to(look, (len(np.asarray(faces)), 2)))
+        off = np.asarray(directions, float).reshape(-1, 2) - proposed[:, None]
+        return -0.5 * (off**2).sum(axis=-1) / variance - np.log(2 * np.pi * variance)
+
+    @property
+    def log_evidence(self) -> float:
+        """Evidence [nats] that the face tells this learner something, as in `Predictor`."""
+        return float(self._evidence.nats[0])
+
+    def snapshot(self) -> 'ThreeLayerNetwork':
+        """A copy of what is believed now."""
+        taken = copy.copy(self)
+        taken._parameters = {
+            name: torch.nn.Parameter(p.detach().clone()) for name, p in self._parameters.items()
+        }
+        taken._evidence = copy.deepcopy(self._evidence)
+        return taken
 
     def learn(self, trial: Trial) -> None:
         """Back-propagation on the pairs of one trial, one step a pair, in the order they came."""
+        self._weigh(trial)
         chosen = slice(-1, None) if self.config.pairs == 'last' else slice(None)
         inputs = self._inputs(trial.face, trial.postures[chosen])
         wanted = torch.from_numpy(
@@ -102,6 +136,16 @@ class ThreeLayerNetwork:
         self.trials += 1
         self.last_error_rad = float(error.detach().norm()) * self.config.angle_scale_rad
 
+    def _weigh(self, trial: Trial) -> None:
+        seen = trial.candidates[: trial.seen_before_shift]
+        if len(seen):
+            self._evidence.weigh(
+                trial.face,
+                lambda faces: np.logaddexp.reduce(
+                    self.log_density(faces, trial.postures[0], seen), axis=1
+                )[None],
+            )
+
     def state(self) -> dict[str, NDArray[Any]]:
         """Everything that learning has changed, as named arrays."""
         arrays = {name: p.detach().numpy().copy() for name, p in self._parameters.items()}
@@ -110,7 +154,7 @@ class ThreeLayerNetwork:
             if momentum is not None:
                 arrays[f'momentum_{name}'] = momentum.numpy().copy()
         arrays['trials'] = np.array(self.trials)
-        return arrays
+        return arrays | self._evidence.state()
 
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
         """Take up the state of `state()`.
@@ -122,13 +166,18 @@ class ThreeLayerNetwork:
             _check_array(name, arrays.get(name), shape)
             if f'momentum_{name}' in arrays:
                 _check_array(f'momentum_{name}', arrays[f'momentum_{name}'], shape)
+        evidence = Evidence()
+        try:
+            evidence.restore(arrays)
+        except KeyError as error:
+            raise ValueError(f'{error} is missing') from None
         for name, p in self._parameters.items():
             p.data.copy_(torch.from_numpy(arrays[name]))
             momentum = arrays.get(f'momentum_{name}')
             self._optimiser.state[p]['momentum_buffer'] = (
                 None if momentum is None else torch.from_numpy(momentum.copy())
             )
-        self.trials = int(arrays['trials'])
+        self.trials, self._evidence = int(arrays['trials']), evidence
 
     def _forward(self, inputs: torch.Tensor) -> torch.Tensor:
         p = self._parameters

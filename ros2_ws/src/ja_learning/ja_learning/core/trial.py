@@ -36,13 +36,15 @@ class Trial:
 
     `face`: uint8 (30, 25). `postures`: (n, 2) [rad], where each shift began, the look at the
     caregiver first. `fixation`: (2,) [rad], direction of the object fixated at the end.
-    `candidates`: (m, 2) [rad], directions of all objects that were seen meanwhile.
+    `candidates`: (m, 2) [rad], directions of all objects that were seen meanwhile; the first
+    `seen_before_shift` of them were seen before anybody acted on the face.
     """
 
     face: NDArray[np.uint8]
     postures: NDArray[np.float64]
     fixation: NDArray[np.float64]
     candidates: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    seen_before_shift: int = 0
 
     def displacements(self) -> NDArray[np.float64]:
         """What remained to turn at each posture, shape (n, 2) [rad]: the target of learning."""
@@ -57,6 +59,8 @@ class TrialRecorder:
         self._face: NDArray[np.uint8] | None = None
         self._postures: list[NDArray[np.float64]] = []
         self._candidates: list[NDArray[np.float64]] = []
+        self._seen_before_shift = 0
+        self._looking_around = False
 
     @property
     def face(self) -> NDArray[np.uint8] | None:
@@ -68,11 +72,16 @@ class TrialRecorder:
         self._face = checked_face(face)
         self._postures = [np.array(posture, float)]
         self._candidates = []
+        self._looking_around = True
 
     def rest(self, posture: ArrayLike) -> None:
         """The head stands still at a posture (2,) [rad]; repeated postures count once."""
         if self._face is not None and not self._same(posture, self._postures[-1]):
             self._postures.append(np.array(posture, float))
+
+    def shift(self) -> None:
+        """From here on the head turns where somebody believes that she looks."""
+        self._looking_around = False
 
     @property
     def look_posture(self) -> NDArray[np.float64]:
@@ -94,6 +103,8 @@ class TrialRecorder:
                 self._candidates.append(direction)
             else:  # the newest sight counts: nearer to the centre, and things move
                 self._candidates[int(np.argmin(distances))] = direction
+        if self._looking_around:
+            self._seen_before_shift = len(self._candidates)
 
     def fixate(self, posture: ArrayLike, direction: ArrayLike) -> Trial | None:
         """An object in this direction is fixated from this posture: the trial, if one was open.
@@ -105,7 +116,13 @@ class TrialRecorder:
             began = began[:-1]  # where the last shift ended, none began
         if self._face is None or not began:
             return None
-        trial = Trial(self._face, np.array(began), np.array(direction, float), self.candidates)
+        trial = Trial(
+            self._face,
+            np.array(began),
+            np.array(direction, float),
+            self.candidates,
+            self._seen_before_shift,
+        )
         self.forget()
         return trial
 
@@ -114,6 +131,7 @@ class TrialRecorder:
         self._face = None
         self._postures = []
         self._candidates = []
+        self._seen_before_shift = 0
 
     def _same(self, a: ArrayLike, b: ArrayLike) -> bool:
         return bool(np.all(np.abs(np.subtract(a, b)) < self._same_within))

@@ -1,0 +1,94 @@
+"""What the fast learner believes at one instant; asking it changes nothing."""
+
+import numpy as np
+import torch
+from numpy.typing import ArrayLike, NDArray
+
+from ja_learning.core.gaze_line_network import (
+    ANGLE_SCALE_RAD,
+    STRETCHES,
+    GazeLineNetwork,
+    standardised,
+)
+
+
+class GazeLineBelief:
+    """A mixture of the members of a network, each with its weight.
+
+    `top_down`: propose the most probable of the objects seen, where one is plausible; else always
+    the best guess on the line of gaze. `plausible_within_nats`: how much less probable than the
+    best guess an object may be.
+    """
+
+    def __init__(
+        self,
+        network: GazeLineNetwork,
+        log_weights: NDArray[np.float64],
+        log_evidence: float,
+        top_down: bool,
+        plausible_within_nats: float,
+    ) -> None:
+        self._network, self._log_weights = network, log_weights
+        self._top_down, self._plausible_within = top_down, plausible_within_nats
+        self.log_evidence = log_evidence
+
+    def propose(
+        self, face: ArrayLike, look: ArrayLike, posture: ArrayLike, candidates: ArrayLike
+    ) -> NDArray[np.float64]:
+        """Change of posture (2,) [rad] towards what she most probably means; as in `Predictor`."""
+        look = np.asarray(look, float)
+        directions = np.asarray(candidates, float).reshape(-1, 2)
+        gaze = self._gaze(face)
+        surest = int(np.argmax(self._log_weights))
+        guesses = (STRETCHES[:, None] * gaze[surest]).numpy().astype(float) * ANGLE_SCALE_RAD
+        density = self._mixed(gaze, np.concatenate([guesses, directions - look]))[0]
+        of_guesses, of_seen = density[: len(guesses)], density[len(guesses) :]
+        best = int(np.argmax(of_guesses))
+        aim = guesses[best]
+        plausible = of_seen > of_guesses[best] - self._plausible_within
+        if self._top_down and plausible.any():
+            aim = directions[int(np.argmax(of_seen))] - look
+        return look + aim - np.asarray(posture, float)
+
+    def belief(
+        self, face: ArrayLike, look: ArrayLike, rng: np.random.Generator, count: int
+    ) -> NDArray[np.float64]:
+        """Directions (count, 2) [rad] drawn from the belief about what she means."""
+        net = self._network
+        with torch.no_grad():
+            shares = torch.softmax(net.stretch_logits, dim=-1).numpy().astype(float)
+            deviations = [
+                torch.exp(logs).numpy().astype(float)
+                for logs in (net.log_gaze_deviation, net.log_place_deviation)
+            ]
+        gaze = self._gaze(face)[:, 0].numpy().astype(float)
+        member = rng.choice(len(shares), count, p=_normalised(np.exp(self._log_weights)))
+        at = (rng.random((count, 1)) > np.cumsum(shares, axis=1)[member]).sum(axis=1)
+        stretch = STRETCHES.numpy()[np.minimum(at, len(STRETCHES) - 1), None]
+        off = stretch * deviations[0][member] * rng.standard_normal((count, 2))
+        near = deviations[1][member] * rng.standard_normal((count, 2))
+        places = stretch * gaze[member] + off + near
+        return np.asarray(look, float) + places * ANGLE_SCALE_RAD
+
+    def log_density(
+        self, faces: ArrayLike, look: ArrayLike, directions: ArrayLike
+    ) -> NDArray[np.float64]:
+        """log p [of 1 / rad^2] of directions (m, 2) given each of faces (n, 30, 25): (n, m)."""
+        places = np.asarray(directions, float).reshape(-1, 2) - np.asarray(look, float)
+        return self._mixed(self._gaze(faces), places) - 2 * np.log(ANGLE_SCALE_RAD)
+
+    def _gaze(self, faces: ArrayLike) -> torch.Tensor:
+        pictures = np.array(faces, np.uint8).reshape(-1, 1, *np.shape(faces)[-2:])
+        with torch.no_grad():
+            return self._network.gaze(standardised(pictures))
+
+    def _mixed(self, gaze: torch.Tensor, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """log p of places (m, 2) [rad], given each of n gazes: (n, m)."""
+        scaled = torch.from_numpy((places / ANGLE_SCALE_RAD).astype(np.float32))
+        with torch.no_grad():
+            density = self._network.log_density(gaze, scaled[None, None]).numpy().astype(float)
+        return np.logaddexp.reduce(density + self._log_weights[:, None, None], axis=0)
+
+
+def _normalised(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    return shares / shares.sum()

@@ -1,0 +1,93 @@
+"""Beliefs about what she means, on the line of her gaze: several small networks in one.
+
+A face gives a gaze u, and what she means stands somewhere along it, since depth cannot be told
+from the direction of a gaze. The displacement c from her face is a mixture over stretches r_k:
+
+    p(c | face) = sum_k w_k N(c; r_k u(face), r_k^2 S_u + S_c)
+
+u is a convolutional network, odd in pan and even in tilt under a mirror (a face is symmetric, and
+so is the task). Angles are in units of `ANGLE_SCALE_RAD`.
+"""
+
+import math
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+from ja_learning.core.trial import FACE_SHAPE
+
+ANGLE_SCALE_RAD = float(np.radians(40))
+STRETCHES = torch.exp(torch.linspace(np.log(0.35), np.log(2.2), 9))
+_HIDDEN = 64
+
+
+class GazeLineNetwork(nn.Module):
+    """`members` networks side by side, each with weights of its own, in grouped operations.
+
+    Every parameter has the members along its first axis, each an equal part of it.
+    """
+
+    def __init__(self, members: int, channels: int) -> None:
+        super().__init__()
+        self.members = members
+        narrow, wide = members * channels, members * 2 * channels
+        rows, columns = (math.ceil(size / 8) for size in FACE_SHAPE)
+        self.coder = nn.Sequential(
+            nn.Conv2d(members, narrow, 5, stride=2, padding=2, groups=members),
+            nn.ReLU(),
+            nn.Conv2d(narrow, wide, 3, stride=2, padding=1, groups=members),
+            nn.ReLU(),
+            nn.Conv2d(wide, wide, 3, stride=2, padding=1, groups=members),
+            nn.ReLU(),
+        )
+        codes = 2 * channels * rows * columns
+        self.hidden_weights = nn.Parameter(_uniform(codes, (members, codes, _HIDDEN)))
+        self.hidden_biases = nn.Parameter(_uniform(codes, (members, 1, _HIDDEN)))
+        self.gaze_weights = nn.Parameter(_uniform(_HIDDEN, (members, _HIDDEN, 2)))
+        self.gaze_biases = nn.Parameter(_uniform(_HIDDEN, (members, 1, 2)))
+        self.stretch_logits = nn.Parameter(torch.zeros(members, len(STRETCHES)))
+        self.log_gaze_deviation = nn.Parameter(torch.tensor([[0.10, 0.06]] * members).log())
+        self.log_place_deviation = nn.Parameter(torch.tensor([[0.05, 0.05]] * members).log())
+
+    def gaze(self, faces: torch.Tensor) -> torch.Tensor:
+        """u, shape (members, n, 2), of standardised faces (n, members or 1, 30, 25)."""
+        faces = faces.expand(-1, self.members, -1, -1)
+        codes = self.coder(torch.cat([faces, faces.flip(-1)]))
+        codes = codes.reshape(len(codes), self.members, -1).transpose(0, 1)
+        hidden = torch.relu(codes @ self.hidden_weights + self.hidden_biases)
+        seen, mirrored = (hidden @ self.gaze_weights + self.gaze_biases).chunk(2, dim=1)
+        pan, tilt = seen[..., 0] - mirrored[..., 0], seen[..., 1] + mirrored[..., 1]
+        return torch.stack([pan, tilt], dim=-1) / 2
+
+    def log_density(self, gaze: torch.Tensor, places: torch.Tensor) -> torch.Tensor:
+        """log p(c | face), (members, n, m), of places (members or 1, n, m, 2), given their u."""
+        stretch = STRETCHES[:, None]
+        variance = stretch**2 * torch.exp(2 * self.log_gaze_deviation)[:, None] + torch.exp(
+            2 * self.log_place_deviation[:, None]
+        )
+        off = places[..., None, :] - stretch * gaze[:, :, None, None]
+        scale = torch.log(2 * np.pi * variance).sum(-1)[:, None, None]
+        parts = -0.5 * ((off**2 / variance[:, None, None]).sum(-1) + scale)
+        shares = torch.log_softmax(self.stretch_logits, dim=-1)[:, None, None]
+        return torch.logsumexp(parts + shares, dim=-1)
+
+
+def standardised(faces: NDArray[np.uint8] | torch.Tensor) -> torch.Tensor:
+    """Faces uint8 (..., 30, 25), each with mean 0 and deviation 1."""
+    pixels = torch.as_tensor(faces).float() / 255
+    mean = pixels.mean(dim=(-2, -1), keepdim=True)
+    deviation = pixels.std(dim=(-2, -1), keepdim=True, correction=0)
+    return (pixels - mean) / deviation.clamp(min=1e-3)
+
+
+def give_member(tensor: torch.Tensor, members: int, giver: int, taker: int) -> None:
+    """Overwrite one member's part of a parameter, or of what an optimiser keeps, by another's."""
+    parts = tensor.reshape(members, -1)
+    parts[taker] = parts[giver]
+
+
+def _uniform(inputs: int, shape: tuple[int, ...]) -> torch.Tensor:
+    """As torch begins a linear layer of so many inputs."""
+    return (2 * torch.rand(shape) - 1) / math.sqrt(inputs)

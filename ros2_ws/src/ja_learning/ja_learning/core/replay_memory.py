@@ -1,0 +1,85 @@
+"""The trials that a learner has lived, to be lived again."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ja_learning.core.trial import FACE_SHAPE
+
+MOST_CANDIDATES = 32
+"""Of more objects seen in a trial, the first so many are remembered."""
+
+
+class ReplayMemory:
+    """A ring of faces, uint8 (n, 30, 25), and the places seen with them, (n, m, 2), NaN-padded."""
+
+    def __init__(self, capacity: int) -> None:
+        self._capacity = capacity
+        self._faces = np.zeros((0, *FACE_SHAPE), np.uint8)
+        self._places = np.zeros((0, MOST_CANDIDATES, 2), np.float32)
+        self._newest = -1
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add(self, face: NDArray[np.uint8], places: NDArray[np.float64]) -> None:
+        """Remember a face and the places (m, 2) seen with it; a full memory drops its oldest."""
+        if self._count == len(self._faces) < self._capacity:
+            self._grow()
+        self._newest = (self._newest + 1) % len(self._faces)
+        self._count = min(self._count + 1, self._capacity)
+        kept = places[:MOST_CANDIDATES]
+        self._faces[self._newest] = face
+        self._places[self._newest] = np.nan
+        self._places[self._newest, : len(kept)] = kept
+
+    def at(self, ages: NDArray[np.int64]) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """Faces (..., 30, 25) and places (..., m, 2) of these ages, the newest 0; m as needed."""
+        index = (self._newest - ages) % max(len(self._faces), 1)
+        places = self._places[index]
+        widest = int((~np.isnan(places[..., 0])).sum(axis=-1).max(initial=0))
+        return self._faces[index], places[..., :widest, :]
+
+    def counts(self, newest: int) -> NDArray[np.int64]:
+        """How many objects were seen in each of so many newest trials."""
+        places = self.at(np.arange(min(newest, self._count)))[1]
+        return (~np.isnan(places[..., 0])).sum(axis=-1)
+
+    def keep_newest(self, count: int) -> None:
+        """Forget all but so many."""
+        self._count = min(count, self._count)
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """All that is remembered, oldest first, as named arrays."""
+        faces, places = self.at(np.arange(self._count)[::-1])
+        there = ~np.isnan(places[..., 0])
+        return {
+            'faces': faces,
+            'candidate_counts': there.sum(axis=-1),
+            'candidates': places[there],
+        }
+
+    @classmethod
+    def restored(cls, arrays: dict[str, NDArray[Any]], capacity: int) -> 'ReplayMemory':
+        """A memory of `state()`; KeyError or ValueError if it is none."""
+        faces, counts, places = (
+            arrays[name] for name in ('faces', 'candidate_counts', 'candidates')
+        )
+        if faces.dtype != np.uint8 or faces.shape != (len(counts), *FACE_SHAPE):
+            raise ValueError(f'{len(counts)} faces must be uint8 of {FACE_SHAPE}')
+        if places.shape != (counts.sum(), 2):
+            raise ValueError(f'candidates {places.shape} do not fit their counts {counts}')
+        memory = cls(capacity)
+        for face, seen in zip(faces, np.split(places, np.cumsum(counts))[:-1], strict=True):
+            memory.add(face, seen)
+        return memory
+
+    def _grow(self) -> None:
+        more = min(max(64, self._count), self._capacity - self._count)
+        faces, places = self.at(np.arange(self._count)[::-1])
+        self._faces = np.concatenate([faces, np.zeros((more, *FACE_SHAPE), np.uint8)])
+        padded = np.full((self._count + more, MOST_CANDIDATES, 2), np.nan, np.float32)
+        padded[: self._count, : places.shape[-2]] = places
+        self._places, self._newest = padded, self._count - 1

@@ -1,0 +1,72 @@
+"""Evidence from shuffled faces: none by chance, much for who knows, and it falls again."""
+
+import numpy as np
+import pytest
+
+from ja_learning.core.evidence import Evidence
+from ja_learning.core.trial import FACE_SHAPE
+
+
+def face_of(number: int) -> np.ndarray:
+    return np.full(FACE_SHAPE, number, np.uint8)
+
+
+def weighed(evidence: Evidence, trials: int, log_p, seed: int = 0) -> list[float]:
+    """The evidence after each trial; `log_p(rng, n)`: what n faces say of what was seen."""
+    rng = np.random.default_rng(seed)
+    history = []
+    for trial in range(trials):
+        evidence.weigh(face_of(trial % 256), lambda faces: log_p(rng, len(faces))[None])
+        history.append(float(evidence.nats[0]))
+    return history
+
+
+def by_chance(rng: np.random.Generator, faces: int) -> np.ndarray:
+    return rng.normal(0, 2, faces)
+
+
+def knowing(rng: np.random.Generator, faces: int) -> np.ndarray:
+    return rng.normal(0, 1, faces) + np.eye(faces)[0] * 2
+
+
+def test_chance_rarely_passes_for_knowledge():
+    """Ville: the evidence is beyond 20 with a probability of 1 / 20 at most, however long."""
+    passed = [max(weighed(Evidence(), 300, by_chance, s)) > np.log(20) for s in range(200)]
+    assert np.mean(passed) < 0.05
+
+
+def test_knowledge_shows_and_falls_again_when_the_world_has_changed():
+    evidence = Evidence()
+    assert weighed(evidence, 60, knowing)[-1] > 20
+    wrong = weighed(evidence, 60, lambda rng, n: -knowing(rng, n))
+    assert wrong[-1] < 0
+
+
+def test_nothing_is_weighed_before_there_are_other_faces():
+    assert weighed(Evidence(), 15, knowing) == [0.0] * 15
+
+
+def test_one_trial_in_which_none_was_meant_costs_little():
+    evidence = Evidence()
+    before = weighed(evidence, 40, knowing)[-1]
+    evidence.weigh(face_of(0), lambda faces: np.array([[-1e6] + [0.0] * (len(faces) - 1)]))
+    assert before - evidence.nats[0] < 3
+
+
+def test_beliefs_are_weighed_side_by_side():
+    evidence = Evidence(beliefs=2)
+    rng = np.random.default_rng(0)
+    for trial in range(60):
+        evidence.weigh(
+            face_of(trial), lambda f: np.array([knowing(rng, len(f)), by_chance(rng, len(f))])
+        )
+    assert evidence.nats[0] > 20 > 5 > evidence.nats[1]
+
+
+def test_restored_evidence_goes_on_as_before():
+    one, other = Evidence(), Evidence()
+    weighed(one, 30, knowing)
+    other.restore(one.state())
+    assert weighed(one, 5, knowing, 1) == weighed(other, 5, knowing, 1)
+    with pytest.raises(ValueError, match='finite'):
+        other.restore(one.state() | {'evidence.nats': np.array([np.nan])})

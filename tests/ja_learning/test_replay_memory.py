@@ -1,0 +1,60 @@
+"""The ring of remembered trials."""
+
+import numpy as np
+import pytest
+
+from ja_learning.core.replay_memory import MOST_CANDIDATES, ReplayMemory
+from ja_learning.core.trial import FACE_SHAPE
+
+
+def filled(trials: int, capacity: int) -> ReplayMemory:
+    memory = ReplayMemory(capacity)
+    for trial in range(trials):
+        memory.add(np.full(FACE_SHAPE, trial % 256, np.uint8), np.full((1 + trial % 3, 2), trial))
+    return memory
+
+
+@pytest.mark.parametrize(
+    ('trials', 'capacity'), [(1, 5), (5, 5), (12, 5), (200, 1000), (300, 150)]
+)
+def test_the_newest_are_kept_and_found_by_age(trials, capacity):
+    memory = filled(trials, capacity)
+    kept = min(trials, capacity)
+    assert len(memory) == kept
+    ages = np.arange(kept)
+    faces, places = memory.at(ages)
+    newest_first = trials - 1 - ages
+    assert np.array_equal(faces[:, 0, 0], newest_first % 256)
+    assert np.array_equal(places[:, 0, 0], newest_first)
+    assert np.array_equal(memory.counts(kept), 1 + newest_first % 3)
+
+
+def test_places_are_padded_as_wide_as_needed():
+    memory = filled(3, 10)
+    assert memory.at(np.array([2]))[1].shape == (1, 1, 2)
+    places = memory.at(np.array([[0, 2], [1, 0]]))[1]
+    assert places.shape == (2, 2, 3, 2)
+    assert np.isnan(places[0, 1, 1:]).all()
+
+
+def test_too_many_candidates_are_cut():
+    memory = ReplayMemory(4)
+    memory.add(np.zeros(FACE_SHAPE, np.uint8), np.zeros((MOST_CANDIDATES + 5, 2)))
+    assert memory.counts(1) == [MOST_CANDIDATES]
+
+
+def test_what_came_before_a_change_can_be_forgotten():
+    memory = filled(30, 100)
+    memory.keep_newest(4)
+    assert len(memory) == 4
+    memory.add(np.zeros(FACE_SHAPE, np.uint8), np.full((1, 2), 99.0))
+    assert np.array_equal(memory.at(np.arange(5))[1][:, 0, 0], [99, 29, 28, 27, 26])
+
+
+@pytest.mark.parametrize('trials', [0, 3, 12])
+def test_a_restored_memory_is_the_same(trials):
+    memory = filled(trials, 8)
+    again = ReplayMemory.restored(memory.state(), 8)
+    one, other = memory.state(), again.state()
+    assert all(np.array_equal(one[name], other[name]) for name in one)
+    assert len(again) == min(trials, 8)
