@@ -24,7 +24,7 @@ from ja_sim.core.scene import load_scene
 
 SEED = 3
 SCENE = 'easy'
-BLOCKS, BLOCK = 4, 300
+BLOCKS, BLOCK = 6, 300
 RUNS = 10
 
 

@@ -1,8 +1,8 @@
 """Does the face tell where she looks? Evidence from the robot's own trials, with nobody's help.
 
 Before a trial is learned, the learner's belief is asked: how probable is what was seen, given the
-face of this trial, and given the faces of other trials? If the face told nothing, all of them would
-do equally well on average, so that
+face of this trial, and given the faces of other trials? If the face told nothing, all of them
+would do equally well on average, so that
 
     ratio = p(seen | this face) / mean over this face and the others of p(seen | face)
 
