@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
+from ja_learning.core import checkpoint
 from ja_learning.core.checkpoint import load_checkpoint, save_checkpoint
 
 ARRAYS = {'weights': np.arange(6.0).reshape(2, 3), 'trials': np.array(7)}
@@ -109,3 +110,20 @@ def test_other_format_is_named(path):
     np.savez(path, description=np.array('{"format": "someone-else-3"}'))
     with pytest.raises(ValueError, match="has format 'someone-else-3', not 'joint-attention"):
         load_checkpoint(path)
+
+
+def test_what_wrote_it_is_told(path):
+    save_checkpoint(path, ARRAYS, {'learner': 'paper'})
+    _, description = load_checkpoint(path)
+    assert description['versions']['numpy'] == np.__version__
+    assert description['versions'].keys() == {'ja_learning', 'torch', 'numpy'}
+
+
+def test_no_file_fills_the_memory(path, monkeypatch):
+    np.savez_compressed(path, description=np.array('{}'), zeros=np.zeros(100_000))
+    assert path.stat().st_size < 10_000
+    monkeypatch.setattr(checkpoint, 'LARGEST_BYTES', 100_000)
+    with pytest.raises(ValueError, match='bytes are more than 100000'):
+        load_checkpoint(path)
+    with pytest.raises(ValueError, match='let the learner remember fewer trials'):
+        save_checkpoint(path, {'faces': np.zeros(100_000)}, {'learner': 'paper'})

@@ -1,15 +1,19 @@
-"""Checkpoints: named arrays and a description in one .npz file, written all or not at all."""
+"""One checkpoint: named arrays and a description in an .npz file, written all or not at all."""
 
 import json
 import os
 import zipfile
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-FORMAT = 'joint-attention-checkpoint-1'
+FORMAT = 'joint-attention-checkpoint-2'
+
+LARGEST_BYTES = 2**30
+"""No larger state is written, and no file that would fill more memory is read."""
 
 
 def save_checkpoint(
@@ -17,11 +21,18 @@ def save_checkpoint(
 ) -> None:
     """Write a checkpoint so that at any instant `path` is either the old file or the new one.
 
-    Raises OSError when the folder cannot be written.
+    The format and the versions of what wrote it are added to the description. Raises OSError when
+    the folder cannot be written, ValueError when the arrays are larger than `LARGEST_BYTES`.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    text = json.dumps({'format': FORMAT, **description})
+    size = sum(array.nbytes for array in arrays.values())
+    if size > LARGEST_BYTES:
+        raise ValueError(
+            f'{path}: {size} bytes are more than the {LARGEST_BYTES} of a checkpoint: '
+            'let the learner remember fewer trials'
+        )
+    text = json.dumps({'format': FORMAT, 'versions': _versions(), **description})
     contents: dict[str, Any] = {**arrays, 'description': np.array(text)}
+    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f'.{path.name}.{os.getpid()}')
     try:
         with open(temporary, 'wb') as file:
@@ -48,6 +59,10 @@ def load_checkpoint(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]
     if not zipfile.is_zipfile(path):
         raise ValueError(f'{path} is not a checkpoint, or was cut short: it is no .npz file')
     try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+        if size > LARGEST_BYTES:
+            raise ValueError(f'its {size} bytes are more than {LARGEST_BYTES}')
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         description = json.loads(str(arrays.pop('description')))
@@ -58,3 +73,7 @@ def load_checkpoint(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]
     if found != FORMAT:
         raise ValueError(f'{path} has format {found!r}, not {FORMAT!r}')
     return arrays, description
+
+
+def _versions() -> dict[str, str]:
+    return {name: version(name) for name in ('ja_learning', 'torch', 'numpy')}

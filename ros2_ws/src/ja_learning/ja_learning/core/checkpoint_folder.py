@@ -1,0 +1,170 @@
+"""The checkpoints of a learner: numbered, the older ones kept, the newest good one taken up."""
+
+import fcntl
+import os
+import re
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ja_common.core.config import ConfigError, parameter
+from ja_learning.core.checkpoint import load_checkpoint, save_checkpoint
+from ja_learning.core.learner import Learner
+
+LAST = 'last.npz'
+"""Link to the checkpoint that was written last, for people and tools; nothing here reads it."""
+
+_NAME = re.compile(r'(?P<kind>\w+)-(?P<number>\d{6,})\.npz')
+
+
+@dataclass(frozen=True)
+class CheckpointConfig:
+    """Where and when a learner is saved."""
+
+    checkpoint_folder: str = parameter(
+        '', 'where what was learned outlives the process; empty: nowhere'
+    )
+    checkpoint_every_trials: int = parameter(
+        10, 'save after so many learned trials; 0: only when asked, and at the end', low=0
+    )
+    checkpoints_kept: int = parameter(
+        5, 'so many of the newest checkpoints of a learner are kept', low=1, high=100000
+    )
+    resume: bool = parameter(True, 'go on from the newest good checkpoint in the folder')
+
+
+class TakenUp(NamedTuple):
+    """The checkpoint that a learner continues from (None: there was none), and why not others."""
+
+    path: Path | None
+    refused: list[str]
+
+
+class CheckpointFolder:
+    """Files `<kind>-<number>.npz`; numbers rise whatever the learner, also when it starts anew.
+
+    One process at a time has the folder: two learners would take each other's for their own.
+    """
+
+    def __init__(self, folder: Path, config: CheckpointConfig) -> None:
+        """Make the folder if need be.
+
+        Raises ConfigError when another process has it, OSError when it cannot be written.
+        """
+        self.folder = folder
+        self.config = config
+        self._saved_trials = 0
+        folder.mkdir(parents=True, exist_ok=True)
+        self._lock = open(folder / '.lock', 'w')  # noqa: SIM115 (held until `close`)
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self._lock.close()
+            raise ConfigError(
+                f'{folder}: another learner keeps its checkpoints there: name another folder'
+            ) from None
+        for unfinished in folder.glob('.*.npz.*'):  # its writer was killed
+            unfinished.unlink()
+
+    def close(self) -> None:
+        """Let another process have the folder."""
+        self._lock.close()
+
+    def save(self, learner: Learner) -> Path:
+        """Write all that was learned; the path. Raises as `save_checkpoint`."""
+        number = max(map(_number, self._newest_first()), default=0) + 1
+        path = self.folder / f'{learner.kind}-{number:06d}.npz'
+        save_checkpoint(path, learner.state(), _description(learner))
+        self._link(path)
+        ours = [other for other in self._newest_first() if _kind(other) == learner.kind]
+        for old in ours[self.config.checkpoints_kept :]:
+            old.unlink()
+        self._saved_trials = learner.trials
+        return path
+
+    def save_when_due(self, learner: Learner) -> None:
+        """Save if so many trials as configured were learned since the last time."""
+        if 0 < self.config.checkpoint_every_trials <= learner.trials - self._saved_trials:
+            self.save(learner)
+
+    def save_when_changed(self, learner: Learner) -> None:
+        """Save if anything was learned since the last time."""
+        if learner.trials != self._saved_trials:
+            self.save(learner)
+
+    def take_up(self, learner: Learner) -> TakenUp:
+        """Restore the newest checkpoint that is whole and of this learner's configuration.
+
+        Raises ConfigError, and changes nothing, when there are checkpoints and none can be used:
+        an untaught learner must not stand unnoticed in the place of a taught one.
+        """
+        refused = []
+        for path in self._newest_first():
+            try:
+                restore_checkpoint(path, learner)
+            except (ValueError, OSError) as error:
+                refused.append(str(error))
+            else:
+                self._saved_trials = learner.trials
+                return TakenUp(path, refused)
+        if refused:
+            raise ConfigError(
+                f'none of the {len(refused)} checkpoints in {self.folder} can be used; the newest:'
+                f' {refused[0]}: mend that, or name another folder'
+            )
+        return TakenUp(None, refused)
+
+    def _newest_first(self) -> list[Path]:
+        found = [path for path in self.folder.glob('*.npz') if _NAME.fullmatch(path.name)]
+        return sorted(found, key=_number, reverse=True)
+
+    def _link(self, path: Path) -> None:
+        temporary = self.folder / f'.{LAST}.{os.getpid()}'
+        try:
+            temporary.symlink_to(path.name)
+            os.replace(temporary, self.folder / LAST)
+        except OSError:
+            pass  # a memory card's file system may know no links
+
+
+def restore_checkpoint(path: Path, learner: Learner) -> None:
+    """Let a learner continue from a checkpoint.
+
+    Raises FileNotFoundError, or ValueError with one sentence when the file is damaged, or of
+    another learner or configuration; the learner is then as before.
+    """
+    arrays, theirs = load_checkpoint(path)
+    ours = _description(learner)
+    if theirs.get('learner') != ours['learner']:
+        raise ValueError(
+            f'{path} is of the learner {theirs.get("learner")!r}, not {ours["learner"]!r}'
+        )
+    made_with, wanted = theirs.get('configuration'), ours['configuration']
+    if not isinstance(made_with, dict):
+        raise ValueError(f'{path} does not say how its learner was configured')
+    for name in sorted(made_with.keys() | wanted.keys()):
+        if made_with.get(name) != wanted.get(name):
+            raise ValueError(
+                f'{path} was made with {name} = {made_with.get(name)!r}, '
+                f'here it is {wanted.get(name)!r}'
+            )
+    try:
+        learner.restore(arrays)
+    except ValueError as error:
+        raise ValueError(f'{path}: {error}') from None
+
+
+def _description(learner: Learner) -> dict[str, Any]:
+    return {
+        'learner': learner.kind,
+        'configuration': asdict(learner.config),
+        'trials': learner.trials,
+    }
+
+
+def _kind(path: Path) -> str:
+    return path.name.rpartition('-')[0]
+
+
+def _number(path: Path) -> int:
+    return int(path.stem.rpartition('-')[2])

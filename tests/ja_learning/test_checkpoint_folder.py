@@ -1,0 +1,259 @@
+"""What was learned outlives the process: the newest good checkpoint, older ones, one sentence."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ja_common.core.config import ConfigError
+from ja_learning.core.checkpoint import load_checkpoint, save_checkpoint
+from ja_learning.core.checkpoint_folder import LAST, CheckpointConfig, CheckpointFolder, TakenUp
+from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
+from ja_learning.core.learner import LearnerChoice, make_learner
+from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
+from made_up_trials import trial
+
+KINDS = (ThreeLayerNetwork.kind, GazeLineLearner.kind)
+
+
+def untaught(kind='paper', seed=0, **network):
+    gaze_line = GazeLineConfig(replay_steps=1, replay_memory=20)
+    return make_learner(LearnerChoice(kind), NetworkConfig(**network), gaze_line, seed)
+
+
+def taught(trials=3, **choice):
+    learner = untaught(**choice)
+    for number in range(trials):
+        learner.learn(trial(number))
+    return learner
+
+
+def same(one, other):
+    ours, theirs = one.state(), other.state()
+    return ours.keys() == theirs.keys() and all(
+        np.array_equal(ours[name], theirs[name]) for name in ours
+    )
+
+
+@pytest.fixture
+def folder(tmp_path):
+    opened = reopened(tmp_path / 'checkpoints')
+    yield opened
+    opened.close()
+
+
+def reopened(path, **config):
+    return CheckpointFolder(path, CheckpointConfig(checkpoints_kept=3, **config))
+
+
+def names(folder):
+    return sorted(path.name for path in folder.folder.glob('[!.]*'))
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_another_process_would_go_on_as_if_nothing_had_happened(folder, kind):
+    learner = taught(30, kind=kind)
+    path = folder.save(learner)
+    heir = untaught(kind=kind, seed=9)
+    assert folder.take_up(heir) == TakenUp(path, [])
+    assert same(heir, learner)
+    for number in range(30, 40):
+        learner.learn(trial(number))
+        heir.learn(trial(number))
+    assert same(heir, learner)
+
+
+def test_the_file_tells_the_whole_configuration(folder):
+    learner = taught(face_scaling='standardised')
+    _, description = load_checkpoint(folder.save(learner))
+    assert description['learner'] == 'paper'
+    assert description['trials'] == 3
+    assert NetworkConfig(**description['configuration']) == learner.config
+
+
+def test_nothing_to_take_up_is_no_fault(folder):
+    learner = untaught()
+    assert folder.take_up(learner) == TakenUp(None, [])
+    assert same(learner, untaught())
+
+
+def test_older_ones_are_kept_and_numbers_rise_over_restarts(folder):
+    for _ in range(5):
+        folder.save(taught())
+    assert names(folder) == [LAST, *(f'paper-00000{number}.npz' for number in (3, 4, 5))]
+    assert os.readlink(folder.folder / LAST) == 'paper-000005.npz'
+    folder.close()
+    again = reopened(folder.folder)
+    assert again.save(taught()).name == 'paper-000006.npz'
+    again.close()
+
+
+def test_one_learner_never_drives_out_anothers(folder):
+    folder.save(taught(kind='gaze_line'))
+    for _ in range(4):
+        folder.save(taught(kind='paper'))
+    assert 'gaze_line-000001.npz' in names(folder)
+
+
+def test_who_starts_anew_is_newer_than_who_knew_more(folder):
+    folder.save(taught(10))
+    path = folder.save(untaught())
+    heir = taught(10)
+    assert folder.take_up(heir).path == path
+    assert heir.trials == 0
+
+
+def spoil_by_cutting(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def spoil_by_a_flipped_bit(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def spoil_description(path: Path, **changes) -> None:
+    arrays, description = load_checkpoint(path)
+    save_checkpoint(path, arrays, {**description, **changes})
+
+
+def spoil_arrays(path: Path, **changes) -> None:
+    arrays, description = load_checkpoint(path)
+    save_checkpoint(path, {**arrays, **changes}, description)
+
+
+CONFIGURATION = json.loads(json.dumps(vars(NetworkConfig())))
+SPOILED = {
+    'cut short': (spoil_by_cutting, 'was cut short'),
+    'flipped bit': (spoil_by_a_flipped_bit, 'not a readable checkpoint'),
+    'empty': (lambda path: path.write_bytes(b''), 'is not a checkpoint'),
+    'text': (lambda path: path.write_text('weights'), 'is not a checkpoint'),
+    'folder': (lambda path: (path.unlink(), path.mkdir()), 'is not a checkpoint'),
+    'other npz': (lambda path: np.savez(path, a=np.zeros(3)), 'not a readable checkpoint'),
+    'older format': (
+        lambda path: spoil_description(path, format='joint-attention-checkpoint-1'),
+        "has format 'joint-attention-checkpoint-1'",
+    ),
+    'other learner': (
+        lambda path: spoil_description(path, learner='gaze_line'),
+        "is of the learner 'gaze_line', not 'paper'",
+    ),
+    'other configuration': (
+        lambda path: spoil_description(
+            path, configuration={**CONFIGURATION, 'face_scaling': 'standardised'}
+        ),
+        "made with face_scaling = 'standardised', here it is 'centred'",
+    ),
+    'unknown setting': (
+        lambda path: spoil_description(path, configuration={**CONFIGURATION, 'layers': 4}),
+        'made with layers = 4, here it is None',
+    ),
+    'no configuration': (
+        lambda path: spoil_description(path, configuration=None),
+        'does not say how its learner was configured',
+    ),
+    'other size': (
+        lambda path: spoil_arrays(path, hidden_biases=np.zeros(3)),
+        'hidden_biases must be numbers of shape',
+    ),
+    'not a number': (
+        lambda path: spoil_arrays(path, hidden_biases=np.full(7, np.nan)),
+        'hidden_biases holds numbers that are not finite',
+    ),
+}
+
+
+@pytest.mark.parametrize(('spoil', 'sentence'), SPOILED.values(), ids=SPOILED)
+def test_what_cannot_be_used_is_refused_and_the_one_before_it_is_taken(folder, spoil, sentence):
+    good = taught(4)
+    before = folder.save(good)
+    newest = folder.save(taught(5))
+    spoil(newest)
+    heir = untaught(seed=9)
+    path, [refused] = folder.take_up(heir)
+    assert path == before
+    assert str(newest) in refused
+    assert sentence in refused
+    assert '\n' not in refused
+    assert same(heir, good)
+    assert folder.save(heir).name == 'paper-000003.npz', 'what was refused is not written over'
+
+
+def test_when_none_can_be_used_nobody_starts_untaught_unnoticed(folder):
+    for _ in range(2):
+        spoil_by_cutting(folder.save(taught()))
+    learner = untaught(seed=9)
+    with pytest.raises(ConfigError, match=r'none of the 2 checkpoints .* newest: .*000002'):
+        folder.take_up(learner)
+    assert same(learner, untaught(seed=9))
+
+
+def test_one_process_at_a_time_has_the_folder(folder):
+    with pytest.raises(ConfigError, match='another learner keeps its checkpoints there'):
+        reopened(folder.folder)
+    folder.close()
+    reopened(folder.folder).close()
+
+
+def test_what_a_killed_writer_left_is_removed(folder):
+    left = folder.folder / '.paper-000001.npz.4711'
+    left.write_bytes(b'half')
+    folder.close()
+    reopened(folder.folder).close()
+    assert not left.exists()
+
+
+def test_a_file_system_without_links_will_do(folder, monkeypatch):
+    def no_links(*_args, **_kwargs):
+        raise PermissionError(1, 'Operation not permitted')
+
+    monkeypatch.setattr(Path, 'symlink_to', no_links)
+    folder.save(taught())
+    assert names(folder) == ['paper-000001.npz']
+
+
+def test_a_full_disk_costs_nothing_that_was_saved(folder, monkeypatch):
+    good = taught()
+    path = folder.save(good)
+
+    def full(*_args, **_kwargs):
+        raise OSError(28, 'No space left on device')
+
+    monkeypatch.setattr(np, 'savez', full)
+    with pytest.raises(OSError, match='No space left'):
+        folder.save(taught(5))
+    heir = untaught(seed=9)
+    assert folder.take_up(heir) == TakenUp(path, [])
+    assert same(heir, good)
+
+
+def test_it_is_saved_every_so_many_trials_and_at_the_end_if_need_be(tmp_path):
+    folder = reopened(tmp_path, checkpoint_every_trials=4)
+    learner = untaught()
+    saved = []
+    for number in range(10):
+        learner.learn(trial(number))
+        folder.save_when_due(learner)
+        saved.append(len(names(folder)[1:]))
+    assert saved == [0, 0, 0, 1, 1, 1, 1, 2, 2, 2]
+    for _ in range(2):
+        folder.save_when_changed(learner)
+    assert len(names(folder)[1:]) == 3
+    folder.close()
+
+
+def test_who_goes_on_is_saved_when_so_many_more_were_learned(tmp_path):
+    folder = reopened(tmp_path, checkpoint_every_trials=4)
+    folder.save(taught(6))
+    learner = untaught()
+    folder.take_up(learner)
+    folder.save_when_changed(learner)
+    assert len(names(folder)[1:]) == 1
+    for number in range(4):
+        learner.learn(trial(number))
+        folder.save_when_due(learner)
+    assert len(names(folder)[1:]) == 2
+    folder.close()

@@ -1,0 +1,87 @@
+"""`kill -9` at any instant: a good checkpoint is there, and few trials are lost."""
+
+import time
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ja_learning.core.checkpoint_folder import CheckpointConfig, CheckpointFolder
+from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
+from made_up_trials import trial
+
+KILLS = 50
+EVERY_TRIALS = 3
+CONFIG = CheckpointConfig(checkpoint_every_trials=EVERY_TRIALS, checkpoints_kept=2)
+LONGEST_LIFE_S = 0.6
+
+pytestmark = pytest.mark.slow
+
+
+def untaught() -> GazeLineLearner:
+    return GazeLineLearner(GazeLineConfig(replay_steps=1), seed=0)
+
+
+def live(folder: Path, tell: Connection) -> None:
+    """Take up what was learned; learn, save and tell the count of trials, until killed."""
+    learner = untaught()
+    checkpoints = CheckpointFolder(folder, CONFIG)
+    checkpoints.take_up(learner)
+    tell.send(learner.trials)
+    while True:
+        learner.learn(trial(learner.trials))
+        tell.send(learner.trials)
+        checkpoints.save_when_due(learner)
+
+
+def test_fifty_kills_cost_few_trials_each_and_nothing_else(tmp_path):
+    random = np.random.default_rng(0)
+    # Its children are made quickly: the server has imported everything already.
+    processes = get_context('forkserver')
+    processes.set_forkserver_preload(['ja_learning.core.gaze_line', 'made_up_trials'])
+    saved, died_writing = 0, 0
+    for _ in range(KILLS):
+        hear, tell = processes.Pipe(duplex=False)
+        life = processes.Process(target=live, args=(tmp_path, tell), daemon=True)
+        life.start()
+        tell.close()
+        assert hear.recv() == saved, 'it goes on from the newest checkpoint'
+        time.sleep(random.uniform(0.0, LONGEST_LIFE_S))
+        life.kill()
+        life.join()
+        lived = last_told(hear, saved)
+        died_writing += bool(list(tmp_path.glob('.*.npz.*')))
+        heir = untaught()
+        checkpoints = CheckpointFolder(tmp_path, CONFIG)
+        assert checkpoints.take_up(heir).refused == [], 'every file that is there is whole'
+        checkpoints.close()
+        assert heir.trials >= max(saved, lived - EVERY_TRIALS)
+        saved = heir.trials
+    assert died_writing, 'no kill fell into the writing of a file: the test is too tame'
+    assert saved > KILLS
+    assert_same_state(heir, uninterrupted(saved))
+
+
+def last_told(hear: Connection, count: int) -> int:
+    """The count of trials that was told last before the end."""
+    try:
+        while True:
+            count = hear.recv()
+    except EOFError:
+        return count
+
+
+def uninterrupted(trials: int) -> GazeLineLearner:
+    learner = untaught()
+    for number in range(trials):
+        learner.learn(trial(number))
+    return learner
+
+
+def assert_same_state(one: GazeLineLearner, other: GazeLineLearner) -> None:
+    ours, theirs = one.state(), other.state()
+    assert ours.keys() == theirs.keys()
+    for name in ours:
+        np.testing.assert_array_equal(ours[name], theirs[name], err_msg=name)
