@@ -17,6 +17,7 @@ from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.point_cloud_codec import encode_columns
 from ja_common.topics import DETECTIONS, FACE_IMAGE, FIXATION, JOINT_STATES, SIM_TRUTH
 from ja_learning.core.checkpoint import load_checkpoint
+from ja_learning.core.checkpoint_folder import LAST
 from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
 from ja_learning.core.trial import Trial
 from ja_sim.truth_codec import FIELDS
@@ -73,16 +74,11 @@ def recorded(path, count: int = TRIALS, **kwargs) -> Recording:
     return Recording(write_recording(path, said_in(day(count), **kwargs)))
 
 
-def learned(recording: Recording, path, seed: int = 0, **parameters):
+def learned(recording: Recording, folder, seed: int = 0, **parameters):
     """The scored trials, and the weights in the end."""
-    every = {
-        'checkpoint_file': path,
-        'checkpoint_every_trials': TRIALS,
-        'seed': seed,
-        **parameters,
-    }
+    every = {'checkpoint_folder': folder, 'seed': seed, **parameters}
     arguments = [part for name, value in every.items() for part in ('-p', f'{name}:={value}')]
-    return score_learner(recording, arguments), load_checkpoint(path)[0]
+    return score_learner(recording, arguments), load_checkpoint(folder / LAST)[0]
 
 
 def same(a, b) -> bool:
@@ -92,32 +88,33 @@ def same(a, b) -> bool:
 @pytest.mark.parametrize('learner', ['paper', 'gaze_line'])
 def test_the_same_recording_and_seed_give_the_same_weights(learner, tmp_path):
     recording = recorded(tmp_path / 'r')
-    first = learned(recording, tmp_path / 'a.npz', learner=learner)
+    first = learned(recording, tmp_path / 'a', learner=learner)
     assert len(first[0]) == TRIALS
-    again = learned(recording, tmp_path / 'b.npz', learner=learner)
+    again = learned(recording, tmp_path / 'b', learner=learner)
     assert first[0] == again[0]
     assert same(first[1], again[1])
 
 
 def test_another_seed_gives_other_weights(tmp_path):
     recording = recorded(tmp_path / 'r')
-    _, weights = learned(recording, tmp_path / 'a.npz', seed=0)
-    _, others = learned(recording, tmp_path / 'b.npz', seed=1)
+    _, weights = learned(recording, tmp_path / 'a', seed=0)
+    _, others = learned(recording, tmp_path / 'b', seed=1)
     assert not same(weights, others)
 
 
 def test_the_node_learns_what_the_network_learns_from_the_same_trials(tmp_path):
-    _, weights = learned(recorded(tmp_path / 'r'), tmp_path / 'a.npz', seed=3)
+    _, weights = learned(recorded(tmp_path / 'r'), tmp_path / 'a', seed=3)
     network = ThreeLayerNetwork(NetworkConfig(), 3)
     for face, meant, _ in day():
         network.learn(Trial(face, LOOK[np.newaxis], meant))
-    for name, array in network.state().items():
+    for name in ('hidden_weights', 'hidden_biases', 'output_weights', 'output_biases'):
+        array = network.state()[name]
         np.testing.assert_allclose(weights[name], array, atol=1e-6)
 
 
 def test_the_curve_rises_and_knows_the_truth(tmp_path):
     recording = recorded(tmp_path / 'r', count=3 * TRIALS)
-    trials, _ = learned(recording, tmp_path / 'a.npz', learning_rate=0.03)
+    trials, _ = learned(recording, tmp_path / 'a', learning_rate=0.03)
     offs = [trial.off_rad for trial in trials]
     assert np.mean(offs[-10:]) < 0.6 * np.mean(offs[:10])
     assert success_rate(trials, 'recorded').rate == 1.0
@@ -125,7 +122,7 @@ def test_the_curve_rises_and_knows_the_truth(tmp_path):
 
 
 def test_without_truth_there_is_an_angle_but_no_success(tmp_path):
-    trials, _ = learned(recorded(tmp_path / 'r', with_truth=False), tmp_path / 'a.npz')
+    trials, _ = learned(recorded(tmp_path / 'r', with_truth=False), tmp_path / 'a')
     assert len(trials) == TRIALS
     assert {trial.success for trial in trials} == {None}
     assert success_rate(trials).trials == 0

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
+from ja_common.core.config import ConfigError
 from ja_common.core.detection import Detection, Kind
 from ja_common.detection_codec import encode_detections
 from ja_common.image_codec import encode_image
@@ -11,7 +13,7 @@ from ja_common.point_cloud_codec import decode_columns
 from ja_common.topics import BELIEF, DETECTIONS, FACE_IMAGE, FIXATION, JOINT_STATES, LM_DELTA
 from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
 from ja_learning.core.trial import Trial
-from ja_learning.learning_module_node import LearningModuleNode
+from ja_learning.learning_module_node import BELIEF_SAMPLES, LearningModuleNode
 from node_bench import header, joint_state
 
 MS = 1_000_000
@@ -74,6 +76,8 @@ class Life:
 @pytest.fixture
 def make_life(make_bench):
     def make(**parameters):
+        # In lockstep what a trial has taught shows in the next look.
+        parameters = {'lockstep': True, **parameters}
         return Life(make_bench(LearningModuleNode, SAYS, [LM_DELTA], **parameters))
 
     return make
@@ -140,6 +144,16 @@ def test_learning_moves_the_proposal_towards_the_fixation(make_life):
     assert distance() < 0.8 * before
 
 
+def test_in_real_time_nobody_waits_and_what_was_learned_shows_later(make_life):
+    life = make_life(lockstep=False, learner='gaze_line', replay_steps=20)
+    red = Detection(Kind.OBJECT, -0.2, 0.1, 0, 0, 10, 10, 1.0)
+    life.look()
+    untaught = list(life.rest(0.0, [red]).position)
+    life.fixate(0.3, (0.4, 0.1))
+    while list(life.look().position) == untaught:
+        assert life.ms < 100_000, 'a thousand images later nothing has been learned'
+
+
 def test_disabled_learning_still_proposes(life):
     assert life.bench.call(SetBool, 'learning_enabled', data=False).success
     before = list(life.look().position)
@@ -159,55 +173,115 @@ def test_reset_forgets_everything(life):
     assert list(life.look().position) == untaught
 
 
-def test_saved_learner_is_loaded_by_another(make_life, tmp_path):
-    path = str(tmp_path / 'folder' / 'learner.npz')
-    first = make_life(checkpoint_file=path)
+def test_what_was_learned_is_taken_up_by_the_next_process(make_life, tmp_path):
+    kept = {'checkpoint_folder': str(tmp_path / 'a folder')}
+    first = make_life(**kept)
     first.trial()
-    assert first.bench.call(Trigger, 'save_checkpoint').message == f'1 trials saved to {path}'
     taught = list(first.look().position)
     first.bench.close()
+    [path] = (tmp_path / 'a folder').glob('paper-*.npz')
 
-    second = make_life(checkpoint_file=path, seed=5)
-    assert list(second.look().position) != taught
-    assert second.bench.call(Trigger, 'load_checkpoint').message == f'1 trials loaded from {path}'
+    second = make_life(**kept, seed=5)
+    assert second.learned == 1
     assert list(second.look().position) == taught
+    second.bench.close()
+    assert [path] == list(path.parent.glob('paper-*.npz')), 'nothing new was learned'
+
+    third = make_life(**kept, seed=5, resume=False)
+    assert third.learned == 0
+    assert list(third.look().position) != taught
 
 
-def test_checkpoint_is_saved_every_so_many_trials(make_life, tmp_path):
-    path = tmp_path / 'learner.npz'
-    life = make_life(checkpoint_file=str(path), checkpoint_every_trials=2)
+def test_heads_side_by_side_keep_what_they_learned_apart(ros_context, tmp_path):
+    place = Parameter('checkpoint_folder', value=str(tmp_path))
+    heads = [
+        LearningModuleNode(context=ros_context, namespace=name, parameter_overrides=[place])
+        for name in ('left', 'right')
+    ]
+    for head in heads:
+        head.destroy_node()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['left', 'right']
+
+
+def test_a_learner_is_saved_and_loaded_on_demand(make_life, tmp_path):
+    life = make_life(checkpoint_folder=str(tmp_path))
+    nothing = life.bench.call(Trigger, 'load_checkpoint')
+    assert not nothing.success
+    assert nothing.message == f'no checkpoint in {tmp_path}'
     life.trial()
-    assert not path.exists()
+    path = tmp_path / 'paper-000001.npz'
+    assert life.bench.call(Trigger, 'save_checkpoint').message == f'1 trials saved to {path}'
+    taught = list(life.look().position)
+    life.rest(0.0)
     life.trial()
-    life.bench.wait(path.exists)
+    assert list(life.look().position) != taught
+    assert life.bench.call(Trigger, 'load_checkpoint').message == f'1 trials loaded from {path}'
+    assert list(life.look().position) == taught
 
 
-def test_checkpoint_without_a_place_or_of_another_kind_is_refused(make_life, tmp_path):
-    nowhere = make_life()
+def test_it_is_saved_every_so_many_trials(make_life, tmp_path):
+    life = make_life(checkpoint_folder=str(tmp_path), checkpoint_every_trials=2)
+    for expected in ([], [1], [1], [1, 2]):
+        life.trial()
+        life.look()  # waits until the trial is learned
+        saved = sorted(tmp_path.glob('paper-*.npz'))
+        assert saved == [tmp_path / f'paper-{number:06d}.npz' for number in expected]
+
+
+def test_what_is_forgotten_stays_forgotten(make_life, tmp_path):
+    first = make_life(checkpoint_folder=str(tmp_path), checkpoint_every_trials=1)
+    untaught = list(first.look().position)
+    first.trial()
+    assert first.bench.call(Trigger, 'reset_learning').success
+    first.bench.close()
+    second = make_life(checkpoint_folder=str(tmp_path), seed=5)
+    assert list(second.look().position) == untaught
+
+
+def test_a_damaged_checkpoint_is_told_and_the_one_before_it_is_used(make_life, tmp_path):
+    first = make_life(checkpoint_folder=str(tmp_path), checkpoint_every_trials=1)
+    first.trial()
+    first.trial()
+    first.bench.close()
+    newest = tmp_path / 'paper-000002.npz'
+    newest.write_bytes(newest.read_bytes()[:-100])
+    second = make_life(checkpoint_folder=str(tmp_path))
+    assert second.learned == 1
+    assert f'refused: {newest} is not a checkpoint' in second.bench.complaint()
+    second.trial()
+
+
+def test_no_untaught_learner_starts_where_only_others_have_learned(make_life, tmp_path):
+    first = make_life(checkpoint_folder=str(tmp_path), hidden=3)
+    first.trial()
+    first.bench.close()
+    with pytest.raises(ConfigError, match='was made with hidden = 3, here it is 7'):
+        make_life(checkpoint_folder=str(tmp_path))
+
+
+def test_without_a_place_saving_and_loading_say_so(life):
     for service in ('save_checkpoint', 'load_checkpoint'):
-        response = nowhere.bench.call(Trigger, service)
+        response = life.bench.call(Trigger, service)
         assert not response.success
-        assert 'checkpoint_file is empty' in response.message
-    nowhere.bench.close()
+        assert 'checkpoint_folder is empty' in response.message
 
-    path = tmp_path / 'learner.npz'
-    life = make_life(checkpoint_file=str(path))
-    assert f'no checkpoint at {path}' in life.bench.call(Trigger, 'load_checkpoint').message
-    path.write_text('weights')
-    response = life.bench.call(Trigger, 'load_checkpoint')
-    assert not response.success
-    assert f'{path} is not a checkpoint' in response.message
+
+def test_a_checkpoint_that_cannot_be_written_is_told_and_learning_goes_on(
+    make_life, tmp_path, monkeypatch
+):
+    life = make_life(checkpoint_folder=str(tmp_path), checkpoint_every_trials=1)
+
+    def full(*_args, **_kwargs):
+        raise OSError(28, 'No space left on device')
+
+    with monkeypatch.context() as broken:
+        broken.setattr(np, 'savez', full)
+        life.trial()
+        life.look()
+        life.bench.wait_for_complaint('learning: [Errno 28] No space left on device')
     life.trial()
-
-
-def test_learner_of_another_size_is_refused(make_life, tmp_path):
-    path = str(tmp_path / 'learner.npz')
-    small = make_life(checkpoint_file=path, hidden=3)
-    assert small.bench.call(Trigger, 'save_checkpoint').success
-    small.bench.close()
-    response = make_life(checkpoint_file=path).bench.call(Trigger, 'load_checkpoint')
-    assert not response.success
-    assert 'hidden_weights must be numbers of shape (7, 752)' in response.message
+    life.look()
+    assert list(tmp_path.glob('paper-*.npz'))
 
 
 @pytest.mark.parametrize(
@@ -251,8 +325,8 @@ def test_another_learner_may_be_chosen_while_the_node_runs(make_bench):
     assert "'teacher' is not one of paper, gaze_line" in refused.reason
 
 
-@pytest.mark.parametrize(('learner', 'samples'), [('paper', 1), ('gaze_line', 200)])
-def test_the_belief_is_told_to_who_looks(make_bench, learner, samples):
+@pytest.mark.parametrize('learner', ['paper', 'gaze_line'])
+def test_the_belief_is_told_to_who_looks(make_bench, learner):
     bench = make_bench(LearningModuleNode, SAYS, [LM_DELTA, BELIEF], learner=learner)
     life = Life(bench)
     life.rest(0.0)
@@ -261,6 +335,6 @@ def test_the_belief_is_told_to_who_looks(make_bench, learner, samples):
     before, looking = bench.heard(BELIEF)
     assert before.width == 0, 'no trial is under way'
     told = decode_columns(looking, ('pan', 'tilt', 'weight'))
-    assert len(told['pan']) == samples
+    assert len(told['pan']) == BELIEF_SAMPLES
     assert told['weight'].sum() == pytest.approx(1.0, abs=1e-5)
     assert np.mean(told['pan']) == pytest.approx(0.1, abs=0.1), 'an untaught belief is about her'

@@ -42,7 +42,7 @@ class LearnerChoice(str, Enum):
     paper = 'paper'
 
 
-PRACTICE_TRIALS = {'gaze_line': 300, 'paper': 1500}
+PRACTICE_TRIALS = {'gaze_line': 300, 'paper': 2000}
 
 OnDeathOption = Annotated[OnDeathChoice, typer.Option(help='What to do when a node dies.')]
 OneProcess = Annotated[bool, typer.Option('--one-process', help='All nodes in one process.')]
@@ -74,6 +74,9 @@ def demo(
     ] = 100,
     seed: Annotated[int, typer.Option(min=0, help='Seed of the world and of the robot.')] = 0,
     scene: Annotated[str, typer.Option(help='Scene of the sim, by name or file.')] = 'easy',
+    resume: Annotated[
+        Path | None, typer.Option(help='Go on from what was learned in this run, in its folder.')
+    ] = None,
     record: Record = False,
     one_process: OneProcess = False,
     view: View = True,
@@ -86,7 +89,7 @@ def demo(
     graph = sim_graph(seed, {'scene': scene}, learner.value)
     stages = standard_course(trials or PRACTICE_TRIALS[learner.value], time_s, exam_trials)
     graph = with_arguments([*[RECORDER] * record, *graph], context.obj or [])
-    sys.exit(run_demo(graph, stages, one_process, on_death.value, context.obj or [], view))
+    sys.exit(run_demo(graph, stages, one_process, on_death.value, context.obj or [], view, resume))
 
 
 @app.command()

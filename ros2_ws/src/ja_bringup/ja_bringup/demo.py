@@ -1,11 +1,12 @@
 """The main job: a simulated head learns joint attention, before your eyes."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from ja_bringup.course import Course, Stage
 from ja_bringup.graph import NodeSpec
 from ja_bringup.progress import WINDOW_TRIALS, ProgressNode, rate_text
-from ja_bringup.run import new_run_folder, run_graph
+from ja_bringup.run import check_memory, new_run_folder, run_graph
 from ja_bringup.supervisor import OnDeath
 
 
@@ -16,8 +17,15 @@ def run_demo(
     on_death: OnDeath,
     arguments: Sequence[str],
     view: bool = False,
+    resume: Path | None = None,
 ) -> int:
-    """Lead the graph through the stages of a course; summary, curve and exit code."""
+    """Lead the graph through the stages of a course; summary, curve and exit code.
+
+    `resume`: the folder of a run, in which learner and gate go on where they were; ConfigError
+    when it holds nothing to go on from.
+    """
+    if resume is not None:
+        check_memory(resume)
     folder = new_run_folder('demo')
     course: list[Course] = []
 
@@ -35,6 +43,7 @@ def run_demo(
         view=view,
         on_death=on_death,
         arguments=arguments,
+        memory=resume,
     )
     for line in summary(watcher, stages):
         print(line)

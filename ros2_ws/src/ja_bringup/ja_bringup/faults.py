@@ -30,7 +30,7 @@ from ja_common.topics import GATE_STATUS, JOINT_COMMANDS
 RIG = {
     'lockstep': 'false', 'camera_rate_hz': '30.0', 'image_width': '160', 'image_height': '120',
     'hold_after_s': '0.13', 'max_speed_rad_s': '2.0', 'max_acceleration_rad_s2': '40.0',
-    'trials_file': '{folder}/trials', 'checkpoint_file': '{folder}/learner.npz',
+    'trials_file': '{folder}/trials', 'checkpoint_folder': '{folder}/checkpoints',
 }  # fmt: skip
 FROZEN_S = 5.0
 PATIENCE_S = 40.0

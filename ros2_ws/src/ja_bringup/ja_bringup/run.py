@@ -20,6 +20,12 @@ from ja_common.core.config import ConfigError
 from ja_common.executor import KeptWaitSetExecutor
 from ja_common.ros_defaults import apply_ros_defaults
 
+# The learner and the gate are kept side by side, so that they are of the same age when they go on.
+_MEMORY = {
+    'learning_module': {'checkpoint_folder': 'checkpoints'},
+    'gate': {'trials_file': 'trials'},
+}
+
 
 def new_run_folder(name: str, parent: Path = Path('runs')) -> Path:
     """`runs/<time>-<name>`, made."""
@@ -56,15 +62,17 @@ def run_graph(
     view: bool = False,
     on_death: OnDeath = 'stop',
     arguments: Sequence[str] = (),
+    memory: Path | None = None,
 ) -> tuple[int, ProgressNode]:
     """Run until `done`, a signal, or a death; the exit code, and the node that has watched.
 
     `arguments`: the ROS arguments that all nodes get (a namespace is the watcher's as well).
+    `memory`: where what is learned is kept, and taken up if it is there; by default the folder.
     `view`: serve the live page beside the graph, in a process of its own.
     """
     apply_ros_defaults()
     check_ros_arguments(arguments)
-    graph = [_with_checkpoint(spec, folder) for spec in graph]
+    graph = [_with_memory(spec, (memory or folder).absolute()) for spec in graph]
     watcher: list[ProgressNode] = []
 
     def make_watcher(context: Context) -> ProgressNode:
@@ -94,11 +102,16 @@ def run_graph(
     return code, watcher[0]
 
 
-def _with_checkpoint(spec: NodeSpec, folder: Path) -> NodeSpec:
-    """What is learned can be saved into the folder of the run, if nobody named another place."""
-    if spec.thing != 'learning_module':
-        return spec
-    ours = {'checkpoint_file': str(folder.absolute() / 'checkpoint.npz')}
+def check_memory(folder: Path) -> None:
+    """Raises ConfigError when a run has left nothing that another could go on from."""
+    checkpoints = folder / _MEMORY['learning_module']['checkpoint_folder']
+    if not list(checkpoints.glob('*.npz')):
+        raise ConfigError(f'{folder} cannot be resumed: there is no checkpoint in {checkpoints}')
+
+
+def _with_memory(spec: NodeSpec, folder: Path) -> NodeSpec:
+    """What the node learns outlives it in the folder, if nobody named another place."""
+    ours = {name: str(folder / place) for name, place in _MEMORY.get(spec.thing, {}).items()}
     return replace(spec, parameters={**ours, **spec.parameters})
 
 

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from sensor_msgs.msg import Image, JointState, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
@@ -25,11 +25,11 @@ from ja_common.point_cloud_codec import encode_columns
 from ja_common.posture_listener import PostureListener
 from ja_common.time_codec import to_ns
 from ja_common.topics import BELIEF, DETECTIONS, FACE_IMAGE, FIXATION, LM_DELTA
-from ja_learning.core.checkpoint import load_checkpoint, save_checkpoint
 from ja_learning.core.gaze_line import GazeLineConfig
 from ja_learning.core.learner import Learner, LearnerChoice, make_learner
 from ja_learning.core.network import NetworkConfig
 from ja_learning.core.trial import TrialRecorder, checked_face
+from ja_learning.kept_learner import KeptLearner
 
 BELIEF_SAMPLES = 200
 
@@ -40,9 +40,10 @@ class LearningModuleConfig:
 
     seed: int = parameter(0, 'seed of the initial weights', low=0)
     learning_enabled_at_start: bool = parameter(True, 'learn from the start')
-    checkpoint_file: str = parameter('', 'where checkpoints are kept (.npz); empty: nowhere')
-    checkpoint_every_trials: int = parameter(
-        0, 'save after so many learned trials; 0: only when asked', low=0
+    lockstep: bool = parameter(
+        False,
+        'the look after a trial waits until that is learned, so that the same seed gives the same '
+        'run (else: nobody waits, and what was learned is used as soon as it is there)',
     )
     still_below_rad_s: float = parameter(
         STILL_BELOW_RAD_S, 'a joint slower than this stands still', low=1e-4, high=5.0
@@ -50,7 +51,10 @@ class LearningModuleConfig:
 
 
 class LearningModuleNode(GraphNode):
-    """One proposal an image while a trial is under way; one lesson a fixation."""
+    """One proposal an image while a trial is under way; one lesson a fixation.
+
+    Lessons are learned in a thread of their own (`KeptLearner`): no proposal waits for them.
+    """
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('learning_module', **node_kwargs)
@@ -60,7 +64,8 @@ class LearningModuleNode(GraphNode):
         self._gaze_line_config = self.configure(GazeLineConfig)
         self._joints = JointCodec(self.configure(JointConfig))
         self._learning = self._config.learning_enabled_at_start
-        self._learner = self._untaught()
+        torch.set_num_threads(1)  # on networks this small, threads wait for each other
+        self._learner = KeptLearner(self, self._untaught, self._config.lockstep)
         self._trial = TrialRecorder()
         self._postures = PostureListener(self, self._joints)
         self._attended = StampJoin([FACE_IMAGE.name, DETECTIONS.name])
@@ -73,8 +78,6 @@ class LearningModuleNode(GraphNode):
         self._belief = self.say(BELIEF)
         # Its own generator: whether somebody looks changes nothing of what is learned.
         self._belief_random = np.random.default_rng(self._config.seed)
-        self.offer(Trigger, 'save_checkpoint', self._on_save)
-        self.offer(Trigger, 'load_checkpoint', self._on_load)
         self.offer(Trigger, 'reset_learning', self._on_reset)
         self.offer(SetBool, 'learning_enabled', self._on_learning_enabled)
 
@@ -86,7 +89,7 @@ class LearningModuleNode(GraphNode):
     def _choose(self, choice: LearnerChoice) -> None:
         if choice != self._choice:
             self._choice = choice
-            self._learner = self._untaught()
+            self._learner.begin_anew()
             self._trial.forget()
 
     def _on_face_image(self, message: Image) -> None:
@@ -131,8 +134,10 @@ class LearningModuleNode(GraphNode):
             trial.see(directions_of_rays(here, rays))
         delta = None
         if trial.face is not None:
-            delta = self._learner.propose(trial.face, trial.look_posture, here, trial.candidates)
+            ask = self._learner.predictor.propose
+            delta = ask(trial.face, trial.look_posture, here, trial.candidates)
         self._delta.publish(self._joints.encode(header, delta))
+        self._learner.tell()
         if self._belief.get_subscription_count():
             self._tell_belief(header)
 
@@ -140,7 +145,7 @@ class LearningModuleNode(GraphNode):
         directions = np.empty((0, 2))
         trial = self._trial
         if trial.face is not None:
-            directions = self._learner.belief(
+            directions = self._learner.predictor.belief(
                 trial.face, trial.look_posture, self._belief_random, BELIEF_SAMPLES
             )
         pan, tilt = directions.T
@@ -159,39 +164,10 @@ class LearningModuleNode(GraphNode):
         if trial is None or not self._learning:
             return
         self._learner.learn(trial)
-        self.health.values['trials learned'] = str(self._learner.trials)
-        self.health.values['last error [rad]'] = f'{self._learner.last_error_rad:.3f}'
-        every = self._config.checkpoint_every_trials
-        if every and self._learner.trials % every == 0:
-            self._save()
-
-    def _checkpoint_file(self) -> Path:
-        if not self._config.checkpoint_file:
-            raise ValueError('the parameter checkpoint_file is empty: no place for checkpoints')
-        return Path(self._config.checkpoint_file).expanduser()
-
-    def _save(self) -> Path:
-        path = self._checkpoint_file()
-        save_checkpoint(path, self._learner.state(), {'learner': self._learner.kind})
-        return path
-
-    def _on_save(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        response.message = f'{self._learner.trials} trials saved to {self._save()}'
-        response.success = True
-        return response
-
-    def _on_load(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        path = self._checkpoint_file()
-        arrays, description = load_checkpoint(path)
-        if description.get('learner') != self._learner.kind:
-            raise ValueError(f'{path} is of a learner {description.get("learner")!r}')
-        self._learner.restore(arrays)
-        response.message = f'{self._learner.trials} trials loaded from {path}'
-        response.success = True
-        return response
+        self._learner.tell()
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        self._learner = self._untaught()
+        self._learner.begin_anew()
         self._trial.forget()
         response.success, response.message = True, 'everything learned is forgotten'
         return response
@@ -201,6 +177,11 @@ class LearningModuleNode(GraphNode):
         response.success = True
         response.message = 'learning' if request.data else 'not learning, still proposing'
         return response
+
+    def destroy_node(self) -> None:
+        """What was lived is learned and saved before the end."""
+        self._learner.close()
+        super().destroy_node()
 
 
 def main(args: list[str] | None = None) -> None:

@@ -120,7 +120,8 @@ def score_learner(
     lacking = [topic.name for topic in _NEEDED if f'/{topic.name}' not in recording.topics]
     if lacking:
         raise ConfigError(f'the recording lacks {", ".join(lacking)}: nothing to learn from')
-    with driven(NodeSpec('ja_learning', 'learning_module', arguments=arguments)) as learner:
+    spec = NodeSpec('ja_learning', 'learning_module', {'lockstep': True}, arguments=arguments)
+    with driven(spec) as learner:
         examiner = _Examiner(learner)
         for message in recording.messages(learner.hears | {f'/{SIM_TRUTH.name}'}):
             examiner.hear(message.topic.name.lstrip('/'), message)

@@ -1,0 +1,120 @@
+"""The learner of a node: it learns beside the images, and what it learned outlives the node."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from std_srvs.srv import Trigger
+
+from ja_common.core.health import Level
+from ja_common.graph_node import GraphNode
+from ja_learning.core.background_learner import BackgroundLearner
+from ja_learning.core.checkpoint_folder import CheckpointConfig, CheckpointFolder
+from ja_learning.core.learner import Learner, Predictor
+from ja_learning.core.trial import Trial
+
+MANY_WAITING = 10
+"""So many trials that wait to be learned mean that learning cannot keep up."""
+
+
+class KeptLearner:
+    """Goes on from the newest good checkpoint, saves itself as it goes, and when it is closed.
+
+    Offers the services `save_checkpoint` and `load_checkpoint`, and reports to the node's health.
+    """
+
+    def __init__(self, node: GraphNode, make: Callable[[], Learner], lockstep: bool) -> None:
+        """`make` gives an untaught learner. `lockstep`: whoever asks waits for the lessons.
+
+        Raises ConfigError or OSError when the checkpoints cannot be used.
+        """
+        self._node = node
+        self._make = make
+        self._lockstep = lockstep
+        self._checkpoints = self._open(node.configure(CheckpointConfig))
+        learner = make()
+        if self._checkpoints is not None and self._checkpoints.config.resume:
+            self._take_up(learner)
+        self._lessons = BackgroundLearner(learner, self._after_lesson)
+        self.tell()
+        node.offer(Trigger, 'save_checkpoint', self._on_save)
+        node.offer(Trigger, 'load_checkpoint', self._on_load)
+
+    @property
+    def predictor(self) -> Predictor:
+        """What is believed now; in lockstep, when all lessons so far are learned."""
+        if self._lockstep:
+            self._lessons.settle()
+        return self._lessons.predictor
+
+    def learn(self, trial: Trial) -> None:
+        """Hand over a finished trial; returns at once."""
+        self._lessons.learn(trial)
+
+    def begin_anew(self) -> None:
+        """Forget everything; a restart will not bring it back."""
+        self._lessons.close()
+        self._lessons = BackgroundLearner(self._make(), self._after_lesson)
+        if self._checkpoints is not None:
+            self._lessons.do(self._checkpoints.save)
+
+    def tell(self) -> None:
+        """Put into the node's health how far learning is, and what went wrong with it."""
+        self._node.health.values['trials learned'] = str(self._lessons.trials)
+        for error in self._lessons.troubles():
+            self._node.problem('learning', f'learning: {error}')
+        waiting = self._lessons.waiting
+        if waiting > MANY_WAITING:
+            text = f'{waiting} trials wait to be learned: give each fewer steps of replay'
+            self._node.problem('waiting', text, Level.WARN)
+
+    def close(self) -> None:
+        """Learn and save what has been lived, and end."""
+        learner = self._lessons.close()
+        if self._checkpoints is None:
+            return
+        try:
+            self._checkpoints.save_when_changed(learner)
+        except (ValueError, OSError) as error:
+            self._node.problem('checkpoints', f'the last trials are lost: {error}')
+        self._checkpoints.close()
+
+    def _open(self, config: CheckpointConfig) -> CheckpointFolder | None:
+        if not config.checkpoint_folder:
+            return None
+        # Heads side by side differ by their namespaces.
+        namespace = self._node.get_namespace().strip('/')
+        return CheckpointFolder(Path(config.checkpoint_folder).expanduser() / namespace, config)
+
+    def _after_lesson(self, learner: Learner) -> None:
+        """In the thread of the lessons."""
+        self._node.health.values['last error [rad]'] = f'{learner.last_error_rad:.3f}'
+        if self._checkpoints is not None:
+            self._checkpoints.save_when_due(learner)
+
+    def _kept_in(self) -> CheckpointFolder:
+        if self._checkpoints is None:
+            raise ValueError('the parameter checkpoint_folder is empty: no place for checkpoints')
+        return self._checkpoints
+
+    def _take_up(self, learner: Learner) -> Path | None:
+        path, refused = self._kept_in().take_up(learner)
+        for text in refused:
+            self._node.problem('checkpoints', f'refused: {text}', Level.WARN)
+        if path is not None:
+            self._node.get_logger().info(f'goes on from {path}, {learner.trials} trials')
+        return path
+
+    def _on_save(self, _: Trigger.Request, response: Trigger.Response) -> Any:
+        path = self._lessons.do(self._kept_in().save)
+        response.message = f'{self._lessons.trials} trials saved to {path}'
+        response.success = True
+        return response
+
+    def _on_load(self, _: Trigger.Request, response: Trigger.Response) -> Any:
+        path = self._lessons.do(self._take_up)
+        if path is None:
+            raise ValueError(f'no checkpoint in {self._kept_in().folder}')
+        response.message = f'{self._lessons.trials} trials loaded from {path}'
+        response.success = True
+        return response
