@@ -327,3 +327,89 @@ def test_posture_is_kept_when_nothing_was_ever_seen():
     decision = make_cycle().step(world.percept())
     assert decision.target == pytest.approx((0.3, -0.1))
     assert decision.source is Source.NONE
+
+
+class GlancingWorld(AngleWorld):
+    """A learner that wants these views, one after the other, until the head has been there."""
+
+    def __init__(self, views, **world):
+        super().__init__(**world)
+        self.views = [np.array(view) for view in views]
+
+    def percept(self):
+        percept = super().percept()
+        self.views = [v for v in self.views if np.abs(v - self.position).max() > 0.02]
+        wanted = self.views[0] - self.position if self.views else None
+        return replace(percept, glance_delta=wanted)
+
+
+def test_the_views_that_are_wanted_are_taken_before_the_first_shift():
+    world = GlancingWorld([(0.4, 0.0), (-0.4, 0.0)], objects=[(0.1, 0.1)])
+    rounds = run(make_cycle(), world, 40)
+    assert phases(rounds)[:3] == [Phase.LOOK, Phase.GLANCE, Phase.SHIFT]
+    glances = [d.target for _, d in rounds if d.phase is Phase.GLANCE]
+    assert glances[0] == pytest.approx((0.4, 0.0))
+    assert glances[-1] == pytest.approx((-0.4, 0.0))
+    assert {d.source for _, d in rounds if d.phase is Phase.GLANCE} == {Source.GLANCE}
+
+
+def test_what_is_fixated_in_a_glance_ends_nothing():
+    world = GlancingWorld([(0.4, 0.0), (-0.4, 0.0)], objects=[(0.4, 0.02), (-0.4, 0.0)])
+    rounds = run(make_cycle(), world, 40)
+    glancing = [d for p, d in rounds if d.phase is Phase.GLANCE and p.fixation is not None]
+    assert glancing, 'objects stand in the centre of the views'
+    assert {d.trials for d in glancing} == {0}
+
+
+@pytest.mark.parametrize(('most', 'taken'), [(0, 0), (1, 1), (3, 3)])
+def test_a_learner_that_never_has_enough_is_cut_off(most, taken):
+    def always_more(world):
+        world.views.append(world.position + np.array([0.1, 0.0]))
+
+    world = GlancingWorld([(0.1, 0.0)], objects=[(0.3, 0.0)])
+    cycle, aims = make_cycle(max_glances=most), []
+    for _ in range(30):
+        always_more(world)
+        decision = cycle.step(world.percept())
+        world.obey(decision.target)
+        if decision.phase is Phase.GLANCE and decision.trials == 0:
+            aims.append(tuple(decision.target))
+    assert len(set(aims)) == taken
+    assert cycle.trials >= 1
+
+
+def test_a_fixation_may_take_its_time():
+    """The evaluator answers only when the head has stood still for a while."""
+
+    def shifts_of_first_trial(wait_s):
+        world, cycle = AngleWorld(objects=[(0.2, 0.0)]), make_cycle(fixation_wait_s=wait_s)
+        since_ns, shifts = None, 0
+        while not cycle.trials:
+            percept = world.percept()
+            now_ns = percept.posture.stamp_ns
+            since_ns = (since_ns or now_ns) if percept.fixation is not None else None
+            if since_ns is None or now_ns - since_ns < 2e8:
+                percept = replace(percept, fixation=None)
+            decision = cycle.step(percept)
+            world.obey(decision.target)
+            shifts = max(shifts, decision.shifts)
+        return shifts
+
+    assert shifts_of_first_trial(0.25) == 0, 'the first shift is fixated'
+    assert shifts_of_first_trial(0.0) > 0, 'given up before the evaluator could answer'
+
+
+def test_the_gate_follows_the_evidence():
+    gating = Gating(GatingConfig(gating='evidence'))
+    cycle = AttentionCycle(CONFIG, gating, np.random.default_rng(0))
+    world = AngleWorld(objects=[(0.2, 0.0)])
+    world.learner = lambda posture: np.array([0.2, 0.0]) - posture
+    for evidence, p_lm in [(-20.0, 0.0), (30.0, 1.0)]:
+        decisions = []
+        for _ in range(60):
+            decisions.append(cycle.step(replace(world.percept(), log_evidence=evidence)))
+            world.obey(decisions[-1].target)
+        assert {round(d.p_lm, 3) for d in decisions} == {p_lm}
+        wanted = Source.LEARNING_MODULE if p_lm else Source.VISUAL_FEEDBACK
+        # The shift under way when the evidence changed was drawn before.
+        assert {d.source for d in decisions[10:] if d.phase is Phase.SHIFT} == {wanted}

@@ -10,13 +10,16 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from ja_common.core.health import Level
+from ja_common.point_cloud_codec import encode_columns
 from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import (
     CLOCK,
+    EVIDENCE,
     FACE_DELTA,
     FIXATION,
     FORWARD_COMMANDS,
     GATE_STATUS,
+    GLANCE_DELTA,
     JOINT_COMMANDS,
     JOINT_STATES,
     JOINT_TRAJECTORY,
@@ -28,8 +31,8 @@ from ja_control.gate_node import GateNode
 from node_bench import header, joint_state
 
 PERIOD_NS = 100_000_000
-PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, FIXATION)
-SAYS = (*PROPOSALS, JOINT_STATES, CLOCK)
+PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, GLANCE_DELTA, FIXATION)
+SAYS = (*PROPOSALS, EVIDENCE, JOINT_STATES, CLOCK)
 FACE_RIGHT = {FACE_DELTA: (-0.5, 0.0)}
 SPEED = 2.0  # the gate's default [rad/s]
 
@@ -43,9 +46,11 @@ class Graph:
         self.pan = 0.0
         bench.wait(lambda: bench.peer.count_subscribers('/clock'))
 
-    def tell(self, proposals, stamp_ns=None, without=()):
+    def tell(self, proposals, stamp_ns=None, without=(), log_evidence=0.0):
         """All topics of one image; those not in `proposals` have nothing to say."""
         stamp_ns = self.stamp_ns if stamp_ns is None else stamp_ns
+        evidence = {'log_evidence': [log_evidence]}
+        self.bench.say(EVIDENCE, encode_columns(header(stamp_ns), evidence))
         for topic in PROPOSALS:
             if topic not in without:
                 self.bench.say(topic, joint_state(stamp_ns, *proposals.get(topic, ())))
@@ -368,7 +373,8 @@ class RealTime:
     """A gate on its own clock, and a head that obeys; the test plays the camera."""
 
     def __init__(self, make_bench, **parameters):
-        says, hears = [*PROPOSALS, JOINT_STATES], [JOINT_COMMANDS, GATE_STATUS]
+        says = [*PROPOSALS, EVIDENCE, JOINT_STATES]
+        hears = [JOINT_COMMANDS, GATE_STATUS]
         parameters = {'control_rate_hz': RATE_HZ, **parameters}
         self.bench = make_bench(GateNode, says, hears, **parameters)
         self.pan = 0.0
@@ -381,6 +387,7 @@ class RealTime:
         for topic in PROPOSALS:
             if topic not in without:
                 self.bench.say(topic, joint_state(stamp_ns, *proposals.get(topic, ())))
+        self.bench.say(EVIDENCE, encode_columns(header(stamp_ns), {'log_evidence': [0.0]}))
 
     def images(self, until, **image):
         """Images, 30 a second, until something holds."""

@@ -1,5 +1,7 @@
 """Fig. 6 (a): the rate at which the learning module is selected."""
 
+import math
+
 import pytest
 
 from ja_control.core.gating import Gating, GatingConfig
@@ -30,3 +32,11 @@ def test_step_so_steep_that_the_exponential_would_overflow():
 def test_constant():
     gating = Gating(GatingConfig(gating='constant', p_lm_max=0.3))
     assert gating.p_lm(0) == gating.p_lm(10**6) == 0.3
+
+
+def test_evidence_opens_the_gate_and_closes_it_again():
+    gating = Gating(GatingConfig(gating='evidence', evidence_centre_nats=3.0, p_lm_max=0.9))
+    assert gating.p_lm(10**6, 3.0) == pytest.approx(0.45)
+    assert gating.p_lm(0, 40.0) == pytest.approx(0.9), 'trials do not count'
+    assert gating.p_lm(10**6, 0.0) == pytest.approx(0.9 / (1 + math.exp(3)))
+    assert gating.p_lm(10**6, -1e6) == 0.0

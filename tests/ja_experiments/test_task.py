@@ -10,9 +10,8 @@ from ja_common.core.posture import Posture
 from ja_control.core.attention_cycle import Phase, Source
 from ja_experiments.config import ExperimentConfig, reading
 from ja_experiments.looks import Looks
-from ja_experiments.robot import Robot
+from ja_experiments.robot import FixedTurn, Robot
 from ja_experiments.task import ATTENDED, SimulatedTask
-from ja_learning.core.trial import Trial
 from ja_sim.core.specs import ObjectsSpec
 
 
@@ -50,21 +49,12 @@ def test_the_camera_sees_what_is_in_its_view_and_of_interest(
     assert objects(blind.detections(setting, at_object)) == []
 
 
-class Timid:
-    """A learner that always proposes the same small turn."""
-
-    def predict(self, face: object, posture: object) -> np.ndarray:
-        return np.array([0.01, 0.0])
-
-    def learn(self, trial: Trial) -> None: ...
-
-
 def sources_of_trials(drawn: str, trials: int) -> list[set[Source]]:
     """Who moved the head in each trial, where nothing is ever in view."""
     config = reading('all').with_settings(
         {'gating': 'constant', 'p_lm_max': 0.5, 'source_drawn': drawn}
     )
-    robot, found = Robot(config, Timid(), np.random.default_rng(0)), []
+    robot, found = Robot(config, FixedTurn([0.01, 0.0]), np.random.default_rng(0)), []
     task = SimulatedTask(config.task, config.interest, ObjectsSpec(), one_look())
     setting, stamp_ns = task.draw(np.random.default_rng(0)), 0
     face = [d for d in task.detections(setting, np.zeros(2)) if d.kind is Kind.FACE]

@@ -58,3 +58,18 @@ def test_face_nearer_to_the_centre_is_what_the_head_watches():
 def test_nothing_is_fixated_while_the_head_moves(velocity):
     assert NEAREST.fixation([ball(0.0)], head(velocity=velocity)) is None
     assert NEAREST.fixation([ball(0.0)], head(velocity=np.multiply(velocity, 0.5))) is not None
+
+
+def test_a_glance_is_no_fixation():
+    """The head must have stood still in one posture for so long."""
+    evaluator = InternalEvaluator(EvaluatorConfig(d_th_rad=0.1, hold_s=0.15))
+
+    def seen(stamp_s, pan=0.0, velocity=(0.0, 0.0)):
+        posture = Posture(round(stamp_s * 1e9), np.array([pan, 0.0]), np.array(velocity))
+        return evaluator.fixation([ball(0.0)], posture) is not None
+
+    assert [seen(0.0), seen(0.1), seen(0.2), seen(0.3)] == [False, False, True, True]
+    assert [seen(0.4, pan=0.5), seen(0.5, pan=0.5)] == [False, False], 'turned between two images'
+    assert [seen(0.6, pan=0.5), seen(0.7, 0.5, (0.3, 0.0)), seen(0.8, 0.5)] == [True, False, False]
+    assert not seen(0.2, pan=0.5), 'the clock was set back: it begins anew'
+    assert seen(0.4, pan=0.5)

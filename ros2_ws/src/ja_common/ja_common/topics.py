@@ -78,6 +78,18 @@ FACE_DELTA = Topic(
 LM_DELTA = Topic(
     'learning_module/delta', JointState, 'change of posture that the learner proposes', **_LINK
 )
+GLANCE_DELTA = Topic(
+    'learning_module/glance_delta',
+    JointState,
+    'change of posture to a view that the learner wants a glance at before the shift',
+    **_LINK,
+)
+EVIDENCE = Topic(
+    'learning_module/evidence',
+    PointCloud2,
+    'log evidence [nats] that the learner does better than chance; one point, `log_evidence`',
+    **_LINK,
+)
 BELIEF = Topic(
     'learning_module/belief',
     PointCloud2,

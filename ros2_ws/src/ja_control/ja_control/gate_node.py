@@ -1,6 +1,7 @@
 """`gate`: arbitrates between visual feedback and the learner, and alone commands the head."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, Trigger
 
@@ -20,12 +21,15 @@ from ja_common.core.stamp_join import StampJoin
 from ja_common.core.stamps import NS_PER_S
 from ja_common.graph_node import GraphNode, spin_node
 from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.point_cloud_codec import decode_columns
 from ja_common.posture_listener import PostureListener
 from ja_common.time_codec import to_ns
 from ja_common.topics import (
+    EVIDENCE,
     FACE_DELTA,
     FIXATION,
     GATE_STATUS,
+    GLANCE_DELTA,
     JOINT_STATES,
     LM_DELTA,
     ROBOT_DESCRIPTION,
@@ -45,7 +49,7 @@ from ja_control.core.joint_limits import JointLimitsConfig
 from ja_control.core.trial_count import load_trials, save_trials
 from ja_control.core.urdf_limits import narrowed, read_joint
 
-_PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, FIXATION)
+_PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, GLANCE_DELTA, FIXATION)
 # Longer than any image takes; a clock that is set forward is no time in which the head turns.
 _LONGEST_STEP_S = 2.0
 _STATUS_EVERY_S = 0.1
@@ -105,7 +109,7 @@ class GateNode(GraphNode):
         self._cycle.trials = self._kept_trials()
 
         self._postures = PostureListener(self, self._joints)
-        self._join = StampJoin([topic.name for topic in _PROPOSALS])
+        self._join = StampJoin([topic.name for topic in (*_PROPOSALS, EVIDENCE)])
         self._header = Header()
         self._stamp_ns = 0
         self._decision: Decision | None = None
@@ -115,7 +119,8 @@ class GateNode(GraphNode):
         self._told_s = -np.inf
 
         for topic in _PROPOSALS:
-            self.hear(topic, self._collector(topic), expected_every_s=2.0)
+            self.hear(topic, self._collector(topic, self._joints.decode), expected_every_s=2.0)
+        self.hear(EVIDENCE, self._collector(EVIDENCE, _log_evidence), expected_every_s=2.0)
         self._output = CommandOutput(self, self.configure(CommandOutputConfig))
         self._status = self.say(GATE_STATUS)
         self.offer(SetBool, 'enable', self._on_enable)
@@ -162,10 +167,10 @@ class GateNode(GraphNode):
         joints = self._joints
         self._border.set_limits(narrowed(self._limits, pan, tilt, joints.signs, joints.offsets))
 
-    def _collector(self, topic: Topic) -> Any:
-        def collect(message: JointState) -> None:
+    def _collector(self, topic: Topic, decode: Callable[[Any], Any]) -> Callable[[Any], None]:
+        def collect(message: Any) -> None:
             stamp_ns = to_ns(message.header.stamp)
-            proposals = self._join.add(topic.name, stamp_ns, self._joints.decode(message))
+            proposals = self._join.add(topic.name, stamp_ns, decode(message))
             if proposals is not None:
                 self._postures.when_known(stamp_ns, partial(self._act, message.header, proposals))
 
@@ -204,7 +209,9 @@ class GateNode(GraphNode):
                 face_delta=proposals[FACE_DELTA.name],
                 vf_delta=proposals[VF_DELTA.name],
                 lm_delta=proposals[LM_DELTA.name],
+                glance_delta=proposals[GLANCE_DELTA.name],
                 fixation=proposals[FIXATION.name],
+                log_evidence=proposals[EVIDENCE.name],
             )
         )
         self._border.aim(decision.target)
@@ -306,6 +313,13 @@ class GateNode(GraphNode):
         self._cycle.go_home()
         response.success, response.message = True, 'turning to the home posture'
         return response
+
+
+def _log_evidence(message: PointCloud2) -> float:
+    column = decode_columns(message, ['log_evidence'])['log_evidence']
+    if column.shape != (1,) or not np.isfinite(column[0]):
+        raise ValueError(f'{EVIDENCE.name} must be one finite number, found {column}')
+    return float(column[0])
 
 
 def main(args: list[str] | None = None) -> None:

@@ -13,6 +13,7 @@ from ja_control.core.gating import GatingConfig
 from ja_control.core.joint_limits import JointLimitsConfig
 from ja_control.core.visual_feedback import VisualFeedbackConfig
 from ja_learning.core.evaluator import EvaluatorConfig
+from ja_learning.core.look_around import LookAroundConfig
 from ja_learning.core.network import NetworkConfig
 from ja_perception.core.salient_objects import InterestConfig
 
@@ -59,6 +60,7 @@ class ExperimentConfig:
             dwell_s=0.0, settle_timeout_s=IMAGE_PERIOD_S / 2
         )
     )
+    look_around: LookAroundConfig = field(default_factory=LookAroundConfig)
     evaluator: EvaluatorConfig = field(default_factory=EvaluatorConfig)
     visual_feedback: VisualFeedbackConfig = field(default_factory=VisualFeedbackConfig)
     interest: InterestConfig = field(default_factory=InterestConfig)

@@ -108,9 +108,9 @@ class FastExperiment:
         """The network as it is now."""
         names = ('hidden_weights', 'hidden_biases', 'output_weights', 'output_biases')
         keys = (*names, *(f'momentum_{name}' for name in names))
-        self._network.restore(
-            dict(zip(keys, self._weights, strict=True)) | {'trials': np.array(self._learned)}
-        )
+        learned = dict(zip(keys, self._weights, strict=True))
+        trials = {'trials': np.array(self._learned)}
+        self._network.restore(self._network.state() | learned | trials)
         return self._network
 
     def run(self, trials: int) -> Outcomes:

@@ -20,12 +20,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ja_control.core.attention_cycle import Phase
 from ja_experiments.config import ExperimentConfig
 from ja_experiments.rendered import DWELL_S, RenderedTask
-from ja_experiments.robot import Robot
+from ja_experiments.robot import FixedTurn, Robot
 from ja_sim.core.scene import load_scene
 from ja_sim.core.world import JointAttentionWorld
 
@@ -166,23 +166,13 @@ def _sha256(chunks: Iterator[bytes] | list[bytes]) -> str:
     return digest.hexdigest()
 
 
-class _LooksAside:
-    """In the learner's place: wherever the head is, it proposes to look aside."""
-
-    def predict(self, face: ArrayLike, posture: ArrayLike) -> NDArray[np.float64]:
-        return np.array(_ASIDE_RAD)
-
-    def learn(self, trial: Any) -> None:
-        pass
-
-
 def _render(scene: str, seed: int, count: int, progress: Callable[[int], None]) -> Looks:
     """Look at her, wait, look aside, and again."""
     config = ExperimentConfig().with_settings(
         {'dwell_s': DWELL_S, 'max_shifts': 1, 'gating': 'constant', 'p_lm_max': 1.0}
     )
     world = JointAttentionWorld(load_scene(scene), seed, IMAGE_SIZE)
-    task = RenderedTask(world, Robot(config, _LooksAside(), np.random.default_rng(seed)))
+    task = RenderedTask(world, Robot(config, FixedTurn(_ASIDE_RAD), np.random.default_rng(seed)))
     faces: list[NDArray] = []
     postures: list[NDArray] = []
     directions: list[NDArray] = []

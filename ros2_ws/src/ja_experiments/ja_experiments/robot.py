@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ja_common.core.detection import Detection, caregiver_face, most_salient
+from ja_common.core.detection import Detection, caregiver_face, most_salient, objects
 from ja_common.core.posture import Posture
 from ja_control.core.attention_cycle import AttentionCycle, Decision, Percept
 from ja_control.core.gating import Gating
@@ -16,17 +16,43 @@ from ja_control.core.joint_limits import JointLimits
 from ja_control.core.visual_feedback import visual_feedback
 from ja_experiments.config import ExperimentConfig
 from ja_learning.core.evaluator import InternalEvaluator
-from ja_learning.core.trial import Trial, TrialRecorder
+from ja_learning.core.learner import Predictor
+from ja_learning.core.learning_module import LearningModule
+from ja_learning.core.trial import Trial
 
 
-class Learner(Protocol):
-    """What the robot asks of its learning module."""
-
-    def predict(self, face: ArrayLike, posture: ArrayLike) -> NDArray[np.float64]:
-        """Proposed change of posture, (2,) [rad]."""
+class Learner(Predictor, Protocol):
+    """What the robot asks of its learner."""
 
     def learn(self, trial: Trial) -> None:
         """Learn from one trial."""
+
+
+class FixedTurn:
+    """In the learner's place: wherever the head is, and whatever the face, the same turn."""
+
+    log_evidence = 0.0
+
+    def __init__(self, turn: ArrayLike) -> None:
+        self._turn = np.array(turn, float)
+
+    def propose(
+        self, face: ArrayLike, look: ArrayLike, posture: ArrayLike, candidates: ArrayLike
+    ) -> NDArray[np.float64]:
+        return self._turn
+
+    def belief(
+        self, face: ArrayLike, look: ArrayLike, rng: np.random.Generator, count: int
+    ) -> NDArray[np.float64]:
+        return np.tile(np.asarray(look, float) + self._turn, (count, 1))
+
+    def log_density(
+        self, faces: ArrayLike, look: ArrayLike, directions: ArrayLike
+    ) -> NDArray[np.float64]:
+        return np.zeros((len(np.asarray(faces)), len(np.asarray(directions))))
+
+    def learn(self, trial: Trial) -> None:
+        pass
 
 
 @dataclass(frozen=True)
@@ -34,7 +60,7 @@ class Step:
     """What the robot made of one image.
 
     `command`: the posture (2,) [rad] that the head is sent to. `fixation`: direction (2,) [rad] of
-    the object in the centre, or None. `lm_delta`: what the network proposed, (2,) [rad], or None.
+    the object in the centre, or None. `lm_delta`: what the learner proposed, (2,) [rad], or None.
     """
 
     command: NDArray[np.float64]
@@ -54,43 +80,37 @@ class Robot:
         self._cycle = AttentionCycle(config.cycle, Gating(config.gating), rng)
         self._evaluator = InternalEvaluator(config.evaluator)
         self._limits = JointLimits(config.limits)
-        self._trial = TrialRecorder()
+        self._module = LearningModule(
+            lambda: learner, config.look_around, config.cycle.still_below_rad_s, seed=0
+        )
 
     def step(
         self, detections: list[Detection], face: NDArray[np.uint8] | None, posture: Posture
     ) -> Step:
         """One image, as detections and the picture of the attended `face`, uint8 (30, 25)."""
-        lm_delta = self._propose(face, posture)
+        rays = [seen.ray for seen in objects(detections)]
+        proposal = self._module.see(posture, np.reshape(rays, (-1, 2)), face)
         fixation = self._evaluator.fixation(detections, posture)
         percept = Percept(
             posture,
             face_delta=self._feedback(caregiver_face(detections)),
             vf_delta=self._feedback(most_salient(detections)),
-            lm_delta=lm_delta,
+            lm_delta=proposal.delta,
+            glance_delta=proposal.glance,
             fixation=fixation,
+            log_evidence=proposal.log_evidence,
         )
         if fixation is not None:
             self._learn(fixation, posture)
         decision = self._cycle.step(percept)
-        return Step(self._limits.clip(decision.target), decision, fixation, lm_delta)
+        return Step(self._limits.clip(decision.target), decision, fixation, proposal.delta)
 
     def _feedback(self, seen: Detection | None) -> NDArray[np.float64] | None:
         gain = self._config.visual_feedback.gain
         return None if seen is None else visual_feedback(seen.ray, gain)
 
-    def _propose(
-        self, face: NDArray[np.uint8] | None, posture: Posture
-    ) -> NDArray[np.float64] | None:
-        if face is not None:
-            self._trial.look(face, posture.position)
-        elif posture.is_still(self._config.cycle.still_below_rad_s):
-            self._trial.rest(posture.position)
-        if self._trial.face is None:
-            return None
-        return self._learner.predict(self._trial.face, posture.position)
-
     def _learn(self, fixation: NDArray[np.float64], posture: Posture) -> None:
-        trial = self._trial.fixate(posture.position, fixation)
+        trial = self._module.fixate(posture, fixation)
         if trial is None:
             return
         if self._config.task.taught == 'executed':

@@ -48,11 +48,12 @@ class Episode:
         return self.sights[0].truth.in_view_at_look
 
 
-class Taught:
+class Taught(ThreeLayerNetwork):
     """A trained network that no longer learns."""
 
     def __init__(self, network: ThreeLayerNetwork) -> None:
-        self.predict = network.predict
+        super().__init__(network.config, seed=0)
+        self.restore(network.state())
 
     def learn(self, trial: object) -> None:
         """Nothing more."""

@@ -13,7 +13,6 @@ from std_srvs.srv import SetBool, Trigger
 
 from ja_common.core.config import parameter
 from ja_common.core.detection import caregiver_face, objects
-from ja_common.core.geometry import directions_of_rays
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_common.core.stamp_join import StampJoin
 from ja_common.core.turns import Turns
@@ -24,14 +23,22 @@ from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.point_cloud_codec import encode_columns
 from ja_common.posture_listener import PostureListener
 from ja_common.time_codec import to_ns
-from ja_common.topics import BELIEF, DETECTIONS, FACE_IMAGE, FIXATION, LM_DELTA
+from ja_common.topics import (
+    BELIEF,
+    DETECTIONS,
+    EVIDENCE,
+    FACE_IMAGE,
+    FIXATION,
+    GLANCE_DELTA,
+    LM_DELTA,
+)
 from ja_learning.core.gaze_line import GazeLineConfig
 from ja_learning.core.learner import Learner, LearnerChoice, make_learner
+from ja_learning.core.learning_module import LearningModule
+from ja_learning.core.look_around import LookAroundConfig
 from ja_learning.core.network import NetworkConfig
-from ja_learning.core.trial import TrialRecorder, checked_face
+from ja_learning.core.trial import checked_face
 from ja_learning.kept_learner import KeptLearner
-
-BELIEF_SAMPLES = 200
 
 
 @dataclass(frozen=True)
@@ -42,8 +49,8 @@ class LearningModuleConfig:
     learning_enabled_at_start: bool = parameter(True, 'learn from the start')
     lockstep: bool = parameter(
         False,
-        'the look after a trial waits until that is learned, so that the same seed gives the same '
-        'run (else: nobody waits, and what was learned is used as soon as it is there)',
+        'answer with what was known a trial ago, and wait for that, so that the same seed gives '
+        'the same run (else: nobody waits, and what was learned is used as soon as it is there)',
     )
     still_below_rad_s: float = parameter(
         STILL_BELOW_RAD_S, 'a joint slower than this stands still', low=1e-4, high=5.0
@@ -66,7 +73,12 @@ class LearningModuleNode(GraphNode):
         self._learning = self._config.learning_enabled_at_start
         torch.set_num_threads(1)  # on networks this small, threads wait for each other
         self._learner = KeptLearner(self, self._untaught, self._config.lockstep)
-        self._trial = TrialRecorder()
+        self._module = LearningModule(
+            lambda: self._learner.predictor,
+            self.configure(LookAroundConfig),
+            self._config.still_below_rad_s,
+            self._config.seed,
+        )
         self._postures = PostureListener(self, self._joints)
         self._attended = StampJoin([FACE_IMAGE.name, DETECTIONS.name])
         # First the proposal for an image, then its lesson, and only then the next proposal.
@@ -75,6 +87,8 @@ class LearningModuleNode(GraphNode):
         self.hear(DETECTIONS, self._on_detections, expected_every_s=2.0)
         self.hear(FIXATION, self._on_fixation, expected_every_s=2.0)
         self._delta = self.say(LM_DELTA)
+        self._glance_delta = self.say(GLANCE_DELTA)
+        self._evidence = self.say(EVIDENCE)
         self._belief = self.say(BELIEF)
         # Its own generator: whether somebody looks changes nothing of what is learned.
         self._belief_random = np.random.default_rng(self._config.seed)
@@ -90,7 +104,7 @@ class LearningModuleNode(GraphNode):
         if choice != self._choice:
             self._choice = choice
             self._learner.begin_anew()
-            self._trial.forget()
+            self._module.forget()
 
     def _on_face_image(self, message: Image) -> None:
         face = checked_face(decode_image(message)[..., 0])
@@ -125,29 +139,17 @@ class LearningModuleNode(GraphNode):
     def _propose(
         self, header: Header, rays: np.ndarray, face: np.ndarray | None, posture: Posture
     ) -> None:
-        trial, here = self._trial, posture.position
-        if face is not None:
-            trial.look(face, here)
-        elif posture.is_still(self._config.still_below_rad_s):
-            trial.rest(here)
-        if posture.is_still(self._config.still_below_rad_s):
-            trial.see(directions_of_rays(here, rays))
-        delta = None
-        if trial.face is not None:
-            ask = self._learner.predictor.propose
-            delta = ask(trial.face, trial.look_posture, here, trial.candidates)
-        self._delta.publish(self._joints.encode(header, delta))
+        proposal = self._module.see(posture, rays, face)
+        self._delta.publish(self._joints.encode(header, proposal.delta))
+        self._glance_delta.publish(self._joints.encode(header, proposal.glance))
+        evidence = {'log_evidence': [proposal.log_evidence]}
+        self._evidence.publish(encode_columns(header, evidence))
         self._learner.tell()
         if self._belief.get_subscription_count():
             self._tell_belief(header)
 
     def _tell_belief(self, header: Header) -> None:
-        directions = np.empty((0, 2))
-        trial = self._trial
-        if trial.face is not None:
-            directions = self._learner.predictor.belief(
-                trial.face, trial.look_posture, self._belief_random, BELIEF_SAMPLES
-            )
+        directions = self._module.believed(self._belief_random)
         pan, tilt = directions.T
         weight = np.full(len(directions), 1 / max(len(directions), 1))
         columns = {'pan': pan, 'tilt': tilt, 'weight': weight}
@@ -160,7 +162,7 @@ class LearningModuleNode(GraphNode):
     def _learn(self, direction: np.ndarray | None, posture: Posture) -> None:
         if direction is None:
             return
-        trial = self._trial.fixate(posture.position, direction)
+        trial = self._module.fixate(posture, direction)
         if trial is None or not self._learning:
             return
         self._learner.learn(trial)
@@ -168,7 +170,7 @@ class LearningModuleNode(GraphNode):
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         self._learner.begin_anew()
-        self._trial.forget()
+        self._module.forget()
         response.success, response.message = True, 'everything learned is forgotten'
         return response
 

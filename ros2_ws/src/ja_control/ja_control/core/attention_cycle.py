@@ -1,4 +1,5 @@
-"""The attention cycle: look at the caregiver, shift, ask whether an object is fixated, look back.
+"""The attention cycle: look at the caregiver, glance aside if the learner wants it, shift, ask
+whether an object is fixated, look back.
 
 One `step` an image. At every shift the gate draws whether visual feedback (VF) or the learning
 module (LM) turns the head (Nagai et al. 2003, section 2.2.5). A trial is what lies between two
@@ -23,6 +24,7 @@ class Phase(Enum):
     """What the head is about."""
 
     LOOK = 'look'
+    GLANCE = 'glance'
     SHIFT = 'shift'
     SEARCH = 'search'
     HOME = 'home'
@@ -33,6 +35,7 @@ class Source(Enum):
 
     NONE = 'none'
     FACE = 'face'
+    GLANCE = 'glance'
     VISUAL_FEEDBACK = 'VF'
     LEARNING_MODULE = 'LM'
 
@@ -57,6 +60,15 @@ class AttentionCycleConfig:
     settle_timeout_s: float = parameter(
         1.5, 'a shift that has not arrived by then is judged where it stands', low=0.05, high=60.0
     )
+    max_glances: int = parameter(
+        2, 'glances before the first shift, at views that the learner wants', low=0, high=20
+    )
+    fixation_wait_s: float = parameter(
+        0.0,
+        'how long to wait, at rest after a shift, for a fixation; as long as the hold_s of the '
+        'evaluator',
+        low=0.0, high=10.0,
+    )  # fmt: skip
     max_shifts: int = parameter(
         5, 'shifts after which a trial without fixation is given up', low=1, high=100
     )
@@ -82,14 +94,18 @@ class AttentionCycleConfig:
 class Percept:
     """What the gate knows about one image: posture at its stamp, and proposals (2,) [rad] or None.
 
-    `fixation` is the direction (2,) [rad] of the object that stands in the centre, if any does.
+    `glance_delta`: to a view that the learner wants before the shift. `fixation`: direction (2,)
+    [rad] of the object that stands in the centre, if any does. `log_evidence` [nats]: that the
+    learner does better than chance.
     """
 
     posture: Posture
     face_delta: NDArray[np.float64] | None = None
     vf_delta: NDArray[np.float64] | None = None
     lm_delta: NDArray[np.float64] | None = None
+    glance_delta: NDArray[np.float64] | None = None
     fixation: NDArray[np.float64] | None = None
+    log_evidence: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -126,6 +142,7 @@ class AttentionCycle:
         self._caregiver: NDArray[np.float64] | None = None
         self._target: NDArray[np.float64] | None = None
         self._learner_drawn = False
+        self._p_lm = gating.p_lm(0, 0.0)
         self._begin(Phase.LOOK)
 
     def go_home(self) -> None:
@@ -145,22 +162,22 @@ class AttentionCycle:
         """One image: advance the cycle, and say which posture to take."""
         step = {
             Phase.LOOK: self._look,
+            Phase.GLANCE: self._glance,
             Phase.SHIFT: self._shift,
             Phase.SEARCH: self._search,
             Phase.HOME: self._home,
         }[self.phase]
+        self._p_lm = self.gating.p_lm(self.trials, percept.log_evidence)
         step(percept)
         target = percept.posture.position if self._target is None else self._target
-        return Decision(
-            target, self.phase, self._source, self.gating.p_lm(self.trials), self.trials,
-            self._shifts,
-        )  # fmt: skip
+        return Decision(target, self.phase, self._source, self._p_lm, self.trials, self._shifts)
 
     def _begin(self, phase: Phase) -> None:
         self.phase = phase
         self._source = Source.NONE
-        self._shifts = 0
+        self._shifts = self._glances = 0
         self._since_ns: int | None = None
+        self._rests_since_ns: int | None = None
         self._face_in_view = True
 
     def _elapsed_s(self, percept: Percept) -> float:
@@ -185,8 +202,22 @@ class AttentionCycle:
             return
         # Centred: hold still, so that nothing but the caregiver moves in the picture of the face.
         if self._elapsed_s(percept) >= self.config.dwell_s:
+            self._begin(Phase.GLANCE)
+            self._glance_on(percept)
+
+    def _glance(self, percept: Percept) -> None:
+        if self._arrived(percept):
+            self._glance_on(percept)
+
+    def _glance_on(self, percept: Percept) -> None:
+        """To the next view that is wanted, or else the first shift."""
+        if percept.glance_delta is None or self._glances >= self.config.max_glances:
             self._begin(Phase.SHIFT)
             self._draw(percept)
+            return
+        self._glances += 1
+        self._source = Source.GLANCE
+        self._turn(percept, percept.glance_delta)
 
     def _look_where_the_face_was(self, percept: Percept) -> None:
         self._source = Source.NONE
@@ -198,6 +229,8 @@ class AttentionCycle:
 
     def _shift(self, percept: Percept) -> None:
         if not self._arrived(percept):
+            return
+        if percept.fixation is None and self._rested_s(percept) < self.config.fixation_wait_s:
             return
         self._shifts += 1
         if percept.fixation is None and self._shifts < self.config.max_shifts:
@@ -212,14 +245,23 @@ class AttentionCycle:
         # Drawn whether or not the learner has an answer: the same seed gives the same sequence of
         # sources.
         if self._shifts == 0 or self.config.source_drawn == 'every_shift':
-            self._learner_drawn = bool(self._rng.random() < self.gating.p_lm(self.trials))
+            self._learner_drawn = bool(self._rng.random() < self._p_lm)
         delta = percept.lm_delta if self._learner_drawn else None
         self._source = Source.LEARNING_MODULE
         if delta is None:
             self._source, delta = Source.VISUAL_FEEDBACK, percept.vf_delta
-        here = percept.posture.position
-        self._target = here if delta is None else here + delta
+        self._turn(percept, np.zeros(2) if delta is None else delta)
+
+    def _turn(self, percept: Percept, delta: NDArray[np.float64]) -> None:
+        self._target = percept.posture.position + delta
         self._since_ns = percept.posture.stamp_ns
+        self._rests_since_ns = None
+
+    def _rested_s(self, percept: Percept) -> float:
+        """How long the head has been where the shift has led."""
+        if self._rests_since_ns is None:
+            self._rests_since_ns = percept.posture.stamp_ns
+        return (percept.posture.stamp_ns - self._rests_since_ns) / NS_PER_S
 
     def _search(self, percept: Percept) -> None:
         if percept.face_delta is not None:

@@ -1,4 +1,8 @@
-"""Gating functions (Fig. 6 (a)): probability p(LM) that a shift follows the learning module."""
+"""Gating functions: probability p(LM) that a shift follows the learning module.
+
+The paper's sigmoid (Fig. 6 (a)) follows a clock: the number of trials. Its future work asks for a
+gate that follows the robot's own performance; that is `evidence`.
+"""
 
 import math
 from dataclasses import dataclass
@@ -11,7 +15,10 @@ class GatingConfig:
     """Which gating function, and its numbers."""
 
     gating: str = parameter(
-        'sigmoid', 'gating function of the trials so far', choices=('sigmoid', 'constant')
+        'sigmoid',
+        'p(LM) as a sigmoid of the trials so far, as a constant, or by the evidence that the '
+        'learner does better than chance',
+        choices=('sigmoid', 'constant', 'evidence'),
     )
     sigmoid_centre_trials: float = parameter(
         12e4, 'trials after which the sigmoid is at half its maximum', low=0.0
@@ -19,22 +26,38 @@ class GatingConfig:
     sigmoid_slope_trials: float = parameter(
         3e4, 'trials by which the argument of the sigmoid grows by one', low=1e-3
     )
+    evidence_centre_nats: float = parameter(
+        3.0,
+        'log evidence at which p(LM) is at half its maximum: by chance it comes so far in less '
+        'than one of exp(3) = 20 lives',
+        low=-50.0, high=50.0,
+    )  # fmt: skip
     p_lm_max: float = parameter(
-        1.0, 'maximum of the sigmoid, and the value of the constant', low=0.0, high=1.0
+        1.0, 'maximum of p(LM), and the value of the constant', low=0.0, high=1.0
     )
 
 
 class Gating:
-    """p(LM) as a function of the number of finished trials."""
+    """p(LM) as a function of the finished trials, or of the evidence for the learner."""
 
     def __init__(self, config: GatingConfig) -> None:
         self._config = config
 
-    def p_lm(self, trials: int) -> float:
-        """Probability, 0-1, that the next shift takes the learner's proposal."""
+    def p_lm(self, trials: int, log_evidence: float = 0.0) -> float:
+        """Probability, 0-1, that the next shift takes the learner's proposal.
+
+        `log_evidence` [nats]: log Bayes factor of 'the face tells the learner something' against
+        'chance'. With even odds at first, p(LM) is how probable the former is, but for the centre.
+        """
         c = self._config
         if c.gating == 'constant':
             return c.p_lm_max
+        if c.gating == 'evidence':
+            return c.p_lm_max * _logistic(log_evidence - c.evidence_centre_nats)
         argument = (trials - c.sigmoid_centre_trials) / c.sigmoid_slope_trials
-        # The logistic function, written so that it cannot overflow.
-        return c.p_lm_max * 0.5 * (1 + math.tanh(argument / 2))
+        return c.p_lm_max * _logistic(argument)
+
+
+def _logistic(argument: float) -> float:
+    """Written so that it cannot overflow."""
+    return 0.5 * (1 + math.tanh(argument / 2))

@@ -13,6 +13,8 @@ from ja_common.core.detection import Detection, Kind, objects
 from ja_common.core.fixation import WIDTH_SIXTH, nearest_to_centre
 from ja_common.core.geometry import directions_of_rays
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
+from ja_common.core.stamps import NS_PER_S
+from ja_learning.core.trial import same_posture
 
 
 @dataclass(frozen=True)
@@ -29,26 +31,32 @@ class EvaluatorConfig:
         'which object is asked: the nearest to the centre, or the most salient of the view',
         choices=('nearest', 'most_salient'),
     )
+    hold_s: float = parameter(
+        0.0,
+        'how long the head must have stood still: what is seen for less is a glance, no fixation',
+        low=0.0, high=10.0,
+    )  # fmt: skip
     still_below_rad_s: float = parameter(
         STILL_BELOW_RAD_S, 'a joint slower than this stands still', low=1e-4, high=5.0
     )
 
 
 class InternalEvaluator:
-    """Eq. 3 on what one image shows, while the head stands still."""
+    """Eq. 3 on what one image after the other shows, while the head stands still."""
 
     def __init__(self, config: EvaluatorConfig) -> None:
         self.config = config
+        self._rests: Posture | None = None
 
     def fixation(
         self, detections: list[Detection], posture: Posture
     ) -> NDArray[np.float64] | None:
         """Direction (pan, tilt), shape (2,) [rad], of the fixated object, or None.
 
-        None while the head moves, and while a face stands nearer to the centre than the object:
-        then the head watches somebody, not something.
+        None until the head has stood still for long enough, and while a face stands nearer to the
+        centre than the object: then the head watches somebody, not something.
         """
-        if not posture.is_still(self.config.still_below_rad_s):
+        if not self._holds_still(posture):
             return None
         seen = objects(detections)
         if self.config.candidate == 'most_salient':
@@ -60,3 +68,14 @@ class InternalEvaluator:
         if any(np.hypot(*d.ray) < distance for d in detections if d.kind is Kind.FACE):
             return None
         return directions_of_rays(posture.position, seen[nearest].ray)
+
+    def _holds_still(self, posture: Posture) -> bool:
+        if not posture.is_still(self.config.still_below_rad_s):
+            self._rests = None
+            return False
+        rests = self._rests
+        held_s = 0.0 if rests is None else (posture.stamp_ns - rests.stamp_ns) / NS_PER_S
+        # Between two images the head may have turned from one rest to another.
+        if rests is None or held_s < 0 or not same_posture(rests.position, posture.position):
+            self._rests, held_s = posture, 0.0
+        return held_s >= self.config.hold_s

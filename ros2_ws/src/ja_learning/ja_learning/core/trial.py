@@ -19,6 +19,11 @@ SAME_POSTURE_RAD = 0.02
 """Postures nearer than this in both joints are one and the same."""
 
 
+def same_posture(a: ArrayLike, b: ArrayLike, within_rad: float = SAME_POSTURE_RAD) -> bool:
+    """Whether two postures (2,) [rad] are nearer than this in both joints."""
+    return bool(np.all(np.abs(np.subtract(a, b)) < within_rad))
+
+
 def checked_face(face: ArrayLike) -> NDArray[np.uint8]:
     """The picture, uint8 (30, 25), of a face. Raises ValueError when it is something else."""
     face = np.asarray(face)
@@ -37,7 +42,7 @@ class Trial:
     `face`: uint8 (30, 25). `postures`: (n, 2) [rad], where each shift began, the look at the
     caregiver first. `fixation`: (2,) [rad], direction of the object fixated at the end.
     `candidates`: (m, 2) [rad], directions of all objects that were seen meanwhile; the first
-    `seen_before_shift` of them were seen before anybody acted on the face.
+    `seen_before_shift` of them were seen before anybody acted on what the face told.
     """
 
     face: NDArray[np.uint8]
@@ -80,7 +85,7 @@ class TrialRecorder:
             self._postures.append(np.array(posture, float))
 
     def shift(self) -> None:
-        """From here on the head turns where somebody believes that she looks."""
+        """From here to the next look, the head turns where somebody believes that she looks."""
         self._looking_around = False
 
     @property
@@ -134,4 +139,4 @@ class TrialRecorder:
         self._seen_before_shift = 0
 
     def _same(self, a: ArrayLike, b: ArrayLike) -> bool:
-        return bool(np.all(np.abs(np.subtract(a, b)) < self._same_within))
+        return same_posture(a, b, self._same_within)

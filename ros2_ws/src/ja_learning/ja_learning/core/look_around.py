@@ -1,0 +1,97 @@
+"""Which way to glance before the shift: what is never seen can never be chosen.
+
+A glance is a look to a side, too short to be a fixation. It shows objects outside the first view,
+so that the learner may choose among more of them, and learn from more of them.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ja_common.core.config import parameter
+from ja_learning.core.trial import same_posture
+
+AT_A_VIEW_RAD = 0.05
+"""The head has taken a view when it rests nearer to it than this in both joints."""
+
+
+@dataclass(frozen=True)
+class LookAroundConfig:
+    """When to glance, and where to."""
+
+    look_around: str = parameter(
+        'off',
+        'glances before the shift: none, to both sides, or only where what she means may well be '
+        'and has not been in view',
+        choices=('off', 'both_sides', 'where_worthwhile'),
+    )
+    glance_pan_rad: float = parameter(
+        0.45, 'how far to either side of the caregiver a glance goes', low=0.05, high=3.0
+    )
+    glance_view_rad: float = parameter(
+        0.3, 'half of the horizontal field of view', low=0.02, high=1.5
+    )
+    glance_worth: float = parameter(
+        0.1,
+        'a side is worth a glance when what she means would be newly seen there with this '
+        'probability',
+        low=0.0, high=1.0,
+    )  # fmt: skip
+
+
+class LookAround:
+    """The views of one trial: taken, and still wanted."""
+
+    def __init__(self, config: LookAroundConfig) -> None:
+        self._config = config
+        self._taken: list[NDArray[np.float64]] = []
+        self._left: list[NDArray[np.float64]] = []
+
+    def begin(self, look: ArrayLike) -> None:
+        """The head looks at the caregiver from this posture (2,) [rad]."""
+        self._taken = [np.array(look, float)]
+        self._left = []
+        if self._config.look_around != 'off':
+            aside = self._config.glance_pan_rad
+            self._left = [self._taken[0] + [pan, 0.0] for pan in (aside, -aside)]
+
+    def rest(self, posture: ArrayLike) -> bool:
+        """The head rests at a posture (2,) [rad]: was it led there by nothing that the face told?
+
+        So it is at the look and, if both sides are always taken, at the sides. Resting anywhere
+        else it has shifted, and glances no more.
+        """
+        for view in self._left:
+            if _near(view, posture):
+                self._taken.append(view)
+                self._left = [other for other in self._left if other is not view]
+        if not any(_near(view, posture) for view in self._taken):
+            self._left = []
+            return False
+        return self._config.look_around == 'both_sides' or _near(self._taken[0], posture)
+
+    def wanted(self, believed: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64] | None:
+        """The next view (2,) [rad] that is worth its time, or None.
+
+        `believed` draws directions (n, 2) [rad] of what she may mean; asked only where it decides.
+        """
+        if not self._left or self._config.look_around == 'both_sides':
+            return next(iter(self._left), None)
+        directions = believed()
+        unseen = ~np.any([self._in_view(view, directions) for view in self._taken], axis=0)
+        worth = [float(np.mean(unseen & self._in_view(side, directions))) for side in self._left]
+        if max(worth) < self._config.glance_worth:
+            self._left = []
+            return None
+        return self._left[int(np.argmax(worth))]
+
+    def _in_view(
+        self, view: NDArray[np.float64], directions: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        return np.abs(directions[:, 0] - view[0]) < self._config.glance_view_rad
+
+
+def _near(view: NDArray[np.float64], posture: ArrayLike) -> bool:
+    return same_posture(view, posture, AT_A_VIEW_RAD)
