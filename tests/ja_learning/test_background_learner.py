@@ -33,6 +33,11 @@ class SlowLearner:
         return f'after {self.trials}'
 
 
+def settle(background):
+    """Wait until all is learned."""
+    background.ask(lambda learner: None)
+
+
 @pytest.fixture
 def slow():
     return SlowLearner()
@@ -42,13 +47,13 @@ def slow():
 def make():
     made = []
 
-    def make_background(learner, learned=lambda learner: None):
-        made.append(BackgroundLearner(learner, learned))
+    def make_background(learner, learned=lambda learner: None, behind=None):
+        made.append(BackgroundLearner(learner, learned, behind))
         return made[-1]
 
     yield make_background
     for background in made:
-        background.close()
+        background.close(0.0)
 
 
 def test_the_snapshot_before_answers_until_the_lesson_is_over(make, slow):
@@ -58,7 +63,7 @@ def test_the_snapshot_before_answers_until_the_lesson_is_over(make, slow):
     assert background.predictor == 'after 0'
     assert (background.trials, background.waiting) == (1, 1)
     slow.may_end.release()
-    background.settle()
+    settle(background)
     assert background.predictor == 'after 1'
     assert (background.trials, background.waiting) == (1, 0)
 
@@ -69,24 +74,29 @@ def test_lessons_are_learned_one_by_one_in_the_order_in_which_they_came(make, sl
     background = make(slow, lambda learner: learned.append(learner.trials))
     for number in range(5):
         background.learn(trial(number))
-    background.settle()
+    settle(background)
     assert learned == [1, 2, 3, 4, 5]
     assert background.troubles() == []
 
 
-def test_what_is_done_with_the_learner_comes_after_the_lessons_and_shows(make, slow):
+def test_the_learner_is_asked_when_it_has_learned_all(make, slow):
     slow.may_end.release(2)
     background = make(slow)
     background.learn(trial(0))
     background.learn(trial(1))
+    assert background.ask(lambda learner: learner.trials) == 2
 
-    def restore(learner):
-        before, learner.trials = learner.trials, 10
-        return before
 
-    assert background.do(restore) == 2
-    assert background.trials == 10
-    assert background.predictor == 'after 10'
+def test_in_step_the_same_lessons_show_however_quick_they_were(make, slow):
+    background = make(slow, behind=1)
+    slow.may_end.release(2)
+    background.learn(trial(0))
+    settle(background)
+    assert background.predictor == 'after 0', 'the newest lesson never shows, though it is over'
+    background.learn(trial(1))
+    assert background.predictor == 'after 1', 'the one before it is waited for'
+    settle(background)
+    assert background.predictor == 'after 1'
 
 
 def test_a_lesson_that_fails_is_told_and_the_next_is_learned(make, slow):
@@ -94,7 +104,7 @@ def test_a_lesson_that_fails_is_told_and_the_next_is_learned(make, slow):
     background = make(slow)
     background.learn(None)
     background.learn(trial(0))
-    background.settle()
+    settle(background)
     assert [str(error) for error in background.troubles()] == ['nothing to learn from']
     assert background.troubles() == []
     assert background.predictor == 'after 1'
@@ -107,19 +117,28 @@ def test_what_fails_after_a_lesson_is_told_and_the_lesson_is_kept(make, slow):
     slow.may_end.release()
     background = make(slow, save)
     background.learn(trial(0))
-    background.settle()
+    settle(background)
     assert [str(error) for error in background.troubles()] == ['the disk is full']
     assert background.predictor == 'after 1'
     with pytest.raises(OSError, match='the disk is full'):
-        background.do(save)
+        background.ask(save)
 
 
 def test_to_close_is_to_learn_what_was_handed_over(slow):
     background = BackgroundLearner(slow, lambda learner: None)
     background.learn(trial(0))
     slow.may_end.release()
-    background.close()
+    assert background.close(PATIENCE_S) is slow
     assert slow.trials == 1
+
+
+def test_what_would_take_too_long_at_the_end_is_left(slow):
+    background = BackgroundLearner(slow, lambda learner: None)
+    for number in range(3):
+        background.learn(trial(number))
+    assert slow.begun.acquire(timeout=PATIENCE_S)
+    threading.Timer(0.5, slow.may_end.release).start()
+    assert background.close(0.0).trials == 1
 
 
 def test_it_learns_what_it_would_have_learned_in_one_thread(make):
@@ -131,6 +150,6 @@ def test_it_learns_what_it_would_have_learned_in_one_thread(make):
         background.learn(trial(number))
         # Asking meanwhile must disturb nothing.
         background.predictor.propose(trial(number).face, (0, 0), (0, 0), [(0.1, 0.2)])
-    state = background.do(GazeLineLearner.state)
+    state = background.ask(GazeLineLearner.state)
     for name, array in alone.state().items():
         np.testing.assert_array_equal(state[name], array, err_msg=name)

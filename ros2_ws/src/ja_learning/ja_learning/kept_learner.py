@@ -16,6 +16,12 @@ from ja_learning.core.trial import Trial
 MANY_WAITING = 10
 """So many trials that wait to be learned mean that learning cannot keep up."""
 
+BEHIND_IN_LOCKSTEP = 1
+"""Learning a trial may take as long as living the next one, on another processor."""
+
+CLOSING_S = 2.0
+"""So long may learning go on when the node is asked to end [s]; then comes the last checkpoint."""
+
 
 class KeptLearner:
     """Goes on from the newest good checkpoint, saves itself as it goes, and when it is closed.
@@ -24,27 +30,25 @@ class KeptLearner:
     """
 
     def __init__(self, node: GraphNode, make: Callable[[], Learner], lockstep: bool) -> None:
-        """`make` gives an untaught learner. `lockstep`: whoever asks waits for the lessons.
+        """`make` gives an untaught learner. `lockstep`: what is believed depends on no clock.
 
         Raises ConfigError or OSError when the checkpoints cannot be used.
         """
         self._node = node
         self._make = make
-        self._lockstep = lockstep
+        self._behind = BEHIND_IN_LOCKSTEP if lockstep else None
         self._checkpoints = self._open(node.configure(CheckpointConfig))
         learner = make()
         if self._checkpoints is not None and self._checkpoints.config.resume:
             self._take_up(learner)
-        self._lessons = BackgroundLearner(learner, self._after_lesson)
+        self._lessons = self._at_work(learner)
         self.tell()
         node.offer(Trigger, 'save_checkpoint', self._on_save)
         node.offer(Trigger, 'load_checkpoint', self._on_load)
 
     @property
     def predictor(self) -> Predictor:
-        """What is believed now; in lockstep, when all lessons so far are learned."""
-        if self._lockstep:
-            self._lessons.settle()
+        """What is believed now; in lockstep, what was believed a trial ago."""
         return self._lessons.predictor
 
     def learn(self, trial: Trial) -> None:
@@ -53,24 +57,27 @@ class KeptLearner:
 
     def begin_anew(self) -> None:
         """Forget everything; a restart will not bring it back."""
-        self._lessons.close()
-        self._lessons = BackgroundLearner(self._make(), self._after_lesson)
+        self._replace(self._make())
         if self._checkpoints is not None:
-            self._lessons.do(self._checkpoints.save)
+            self._lessons.ask(self._checkpoints.save)
 
     def tell(self) -> None:
         """Put into the node's health how far learning is, and what went wrong with it."""
+        waiting = self._lessons.waiting
         self._node.health.values['trials learned'] = str(self._lessons.trials)
+        self._node.health.values['of these still waiting'] = str(waiting)
         for error in self._lessons.troubles():
             self._node.problem('learning', f'learning: {error}')
-        waiting = self._lessons.waiting
         if waiting > MANY_WAITING:
             text = f'{waiting} trials wait to be learned: give each fewer steps of replay'
             self._node.problem('waiting', text, Level.WARN)
 
     def close(self) -> None:
         """Learn and save what has been lived, and end."""
-        learner = self._lessons.close()
+        learner = self._lessons.close(CLOSING_S)
+        if learner.trials < self._lessons.trials:
+            lost = self._lessons.trials - learner.trials
+            self._node.problem('learning', f'{lost} trials were not learned before the end')
         if self._checkpoints is None:
             return
         try:
@@ -85,6 +92,13 @@ class KeptLearner:
         # Heads side by side differ by their namespaces.
         namespace = self._node.get_namespace().strip('/')
         return CheckpointFolder(Path(config.checkpoint_folder).expanduser() / namespace, config)
+
+    def _at_work(self, learner: Learner) -> BackgroundLearner:
+        return BackgroundLearner(learner, self._after_lesson, self._behind)
+
+    def _replace(self, learner: Learner) -> None:
+        self._lessons.close(0.0)
+        self._lessons = self._at_work(learner)
 
     def _after_lesson(self, learner: Learner) -> None:
         """In the thread of the lessons."""
@@ -106,15 +120,17 @@ class KeptLearner:
         return path
 
     def _on_save(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        path = self._lessons.do(self._kept_in().save)
+        path = self._lessons.ask(self._kept_in().save)
         response.message = f'{self._lessons.trials} trials saved to {path}'
         response.success = True
         return response
 
     def _on_load(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        path = self._lessons.do(self._take_up)
+        learner = self._make()
+        path = self._take_up(learner)
         if path is None:
             raise ValueError(f'no checkpoint in {self._kept_in().folder}')
+        self._replace(learner)
         response.message = f'{self._lessons.trials} trials loaded from {path}'
         response.success = True
         return response

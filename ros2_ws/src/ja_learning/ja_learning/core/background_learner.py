@@ -2,31 +2,43 @@
 
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import TypeVar
 
 from ja_learning.core.learner import Learner, Predictor
 from ja_learning.core.trial import Trial
 
-Result = TypeVar('Result')
+Answer = TypeVar('Answer')
 
 
 class BackgroundLearner:
-    """Owns a learner, which nobody else may touch but through `do`.
+    """Owns a learner, which nobody else may touch but through `ask`.
 
-    What is asked of `predictor` is answered by the newest snapshot: a lesson shows in it at the
-    end of its update, all at once. Who needs the same answers in every run calls `settle` first.
+    A lesson shows in what `predictor` answers all at once, when it is over. When that is depends
+    on what else the machine has to do. Who needs the same answers in every run sets `behind`: the
+    newest so many lessons never show yet, and all those before them are waited for.
     """
 
-    def __init__(self, learner: Learner, learned: Callable[[Learner], None]) -> None:
+    def __init__(
+        self, learner: Learner, learned: Callable[[Learner], None], behind: int | None = None
+    ) -> None:
         """`learned` is called after every lesson, in the thread that learns."""
         self._learner = learner
         self._learned = learned
+        self._behind = behind
         self._thread = ThreadPoolExecutor(1, thread_name_prefix='learner')
-        self._lessons: deque[Future[None]] = deque()
-        self.predictor: Predictor = learner.snapshot()
+        self._lessons: deque[Future[Predictor]] = deque()
+        self._predictor: Predictor = learner.snapshot()
+        self._troubles: deque[Exception] = deque()
         self.trials = learner.trials
         """Trials handed over, those that are still to be learned included."""
+
+    @property
+    def predictor(self) -> Predictor:
+        """What is believed now."""
+        while self._lessons and self._may_show():
+            self._predictor = self._lessons.popleft().result()
+        return self._predictor
 
     @property
     def waiting(self) -> int:
@@ -38,39 +50,32 @@ class BackgroundLearner:
         self.trials += 1
         self._lessons.append(self._thread.submit(self._learn, trial))
 
-    def settle(self) -> None:
-        """Wait until all that was handed over is learned."""
-        for lesson in self._lessons:
-            lesson.exception()
-
     def troubles(self) -> list[Exception]:
-        """What went wrong in lessons since the last call (in `learned` too); waits for nothing."""
-        ended = []
-        while self._lessons and self._lessons[0].done():
-            ended.append(self._lessons.popleft().exception())
-        return [error for error in ended if isinstance(error, Exception)]
+        """What went wrong in lessons since the last call, in `learned` too."""
+        return [self._troubles.popleft() for _ in range(len(self._troubles))]
 
-    def do(self, action: Callable[[Learner], Result]) -> Result:
-        """Let something be done with the learner when all is learned, and wait for the result.
+    def ask(self, question: Callable[[Learner], Answer]) -> Answer:
+        """The answer of the learner itself when all is learned; waits for it.
 
-        What the action raises is raised here.
+        What the question raises is raised here.
         """
+        return self._thread.submit(question, self._learner).result()
 
-        def act() -> Result:
-            result = action(self._learner)
-            self.predictor = self._learner.snapshot()
-            return result
-
-        result = self._thread.submit(act).result()
-        self.trials = self._learner.trials
-        return result
-
-    def close(self) -> Learner:
-        """Learn what was handed over, end the thread, and give the learner back."""
-        self._thread.shutdown()
+    def close(self, patience_s: float) -> Learner:
+        """Learn what was handed over, if it takes no longer [s], and give the learner back."""
+        wait(self._lessons, timeout=patience_s)
+        self._thread.shutdown(cancel_futures=True)
         return self._learner
 
-    def _learn(self, trial: Trial) -> None:
-        self._learner.learn(trial)
-        self.predictor = self._learner.snapshot()
-        self._learned(self._learner)
+    def _may_show(self) -> bool:
+        if self._behind is None:
+            return self._lessons[0].done()
+        return len(self._lessons) > self._behind
+
+    def _learn(self, trial: Trial) -> Predictor:
+        try:
+            self._learner.learn(trial)
+            self._learned(self._learner)
+        except Exception as error:  # it belongs to who asks for troubles
+            self._troubles.append(error)
+        return self._learner.snapshot()
