@@ -37,7 +37,7 @@ from ja_learning.core.learner import Learner, LearnerChoice, make_learner
 from ja_learning.core.learning_module import LearningModule
 from ja_learning.core.look_around import LookAroundConfig
 from ja_learning.core.network import NetworkConfig
-from ja_learning.core.trial import checked_face
+from ja_learning.core.trial import Trial, checked_face
 from ja_learning.kept_learner import KeptLearner
 
 
@@ -163,8 +163,11 @@ class LearningModuleNode(GraphNode):
         if direction is None:
             return
         trial = self._module.fixate(posture, direction)
-        if trial is None or not self._learning:
-            return
+        if trial is not None and self._learning:
+            self.teach(trial, posture.stamp_ns)
+
+    def teach(self, trial: Trial, stamp_ns: int) -> None:
+        """Learn from a trial that ended in a fixation on the image of this stamp."""
         self._learner.learn(trial)
         self._learner.tell()
 
