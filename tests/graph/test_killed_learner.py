@@ -1,0 +1,98 @@
+"""The learner is killed in the running graph, started again, and goes on where it was."""
+
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.node import Node
+
+from ja_bringup.graph import NodeSpec, sim_graph
+from ja_bringup.supervisor import Supervisor
+from ja_common.executor import KeptWaitSetExecutor
+from ja_common.topics import DIAGNOSTICS
+
+KILLS = 2
+EVERY_TRIALS = 3
+PATIENCE_S = 60.0
+
+pytestmark = [pytest.mark.usefixtures('domain'), pytest.mark.slow]
+
+
+class Witness(Node):
+    """Hears how many trials the learner has learned."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__('witness', context=context)
+        self.learned: int | None = None
+        self.create_subscription(DiagnosticArray, DIAGNOSTICS.name, self._hear, DIAGNOSTICS.hears)
+
+    def _hear(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name == '/learning_module':
+                values = {pair.key: pair.value for pair in status.values}
+                handed_over = int(values['trials learned'])
+                self.learned = handed_over - int(values['of these still waiting'])
+
+
+def graph(folder: Path) -> list[NodeSpec]:
+    small = {'image_width': 160, 'image_height': 120}
+    kept = {'checkpoint_folder': str(folder), 'checkpoint_every_trials': EVERY_TRIALS}
+    return [
+        replace(node, parameters={**node.parameters, **kept})
+        if node.thing == 'learning_module'
+        else node
+        for node in sim_graph(seed=1, sim_parameters=small)
+    ]
+
+
+def test_a_killed_learner_loses_few_trials_and_learns_on(tmp_path):
+    context = Context()
+    rclpy.init(args=[], context=context)
+    executor = KeptWaitSetExecutor(context=context)
+    witness = Witness(context)
+    executor.add_node(witness)
+    supervisor = Supervisor(graph(tmp_path / 'kept'), tmp_path / 'log', 'restart', print)
+    counts: list[tuple[int, int]] = []
+
+    def story() -> Iterator[None]:
+        known = 0
+        for _ in range(KILLS):
+            yield from until(lambda known=known: (witness.learned or 0) > known + 2 * EVERY_TRIALS)
+            before, pid = witness.learned, supervisor.pids['learning_module']
+            os.kill(pid, signal.SIGKILL)
+            yield from until(lambda pid=pid: supervisor.pids['learning_module'] != pid)
+            witness.learned = None
+            yield from until(lambda: witness.learned is not None)
+            known = witness.learned
+            counts.append((before, known))
+        yield from until(lambda: witness.learned > known)
+
+    told = story()
+
+    def tick() -> bool:
+        executor.spin_once(timeout_sec=0.1)
+        return next(told, 'over') == 'over'
+
+    try:
+        assert supervisor.run(tick) == 0
+    finally:
+        executor.shutdown()
+        witness.destroy_node()
+        context.try_shutdown()
+    assert len(counts) == KILLS
+    assert all(after >= before - EVERY_TRIALS for before, after in counts), counts
+    assert 'Traceback' not in (tmp_path / 'log' / 'learning_module.log').read_text()
+
+
+def until(condition: Callable[[], bool]) -> Iterator[None]:
+    end_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end_s, 'the learner did not go on'
+        yield
