@@ -26,6 +26,14 @@ def figures(
     ablations: Annotated[int, typer.Option(min=0, help='Seeds of the ablations; 0: none.')] = 0,
     scene: Annotated[str, typer.Option(help='Scene of the sim, by name or file.')] = 'default',
     looks_seed: Annotated[int, typer.Option(min=0, help='Seed of the caregiver looked at.')] = 0,
+    data: Annotated[
+        Path | None,
+        typer.Option(help='Folder of `./ja export`: recorded looks in place of rendered ones.'),
+    ] = None,
+    pool: Annotated[
+        int,
+        typer.Option(min=0, help='Recorded looks to learn from; 0: 125, or four fifths of them.'),
+    ] = 0,
     workers: Annotated[int, typer.Option(min=1, help='Cores to use.')] = _CORES,
     output: Annotated[Path | None, typer.Option(help='Folder of the report.')] = None,
 ) -> None:
@@ -39,6 +47,8 @@ def figures(
         plan=Plan(trials=trials, seeds=tuple(range(seeds))),
         scene=scene,
         looks_seed=looks_seed,
+        data=str(data or ''),
+        pool=pool,
         ablation_seeds=min(ablations, seeds),
         workers=workers,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,8 @@ class Estimate:
     n: int
 
     def __str__(self) -> str:
+        if math.isnan(self.mean):
+            return '-'
         return f'{self.mean:.3f} ({self.low:.3f}-{self.high:.3f})'
 
 

@@ -35,16 +35,22 @@ _TEST_SEED = 1_000_000
 
 @dataclass(frozen=True)
 class Materials:
-    """What all runs share: looks to learn from and to test on, and where objects are placed."""
+    """What all runs share: looks to learn from and to test on, and where objects are placed.
+
+    `origin`: where the looks come from, for people.
+    """
 
     pool: Looks
     fresh: Looks
     places: ObjectsSpec
+    origin: str = ''
 
     @classmethod
-    def of(cls, looks: Looks, places: ObjectsSpec) -> Materials:
-        """The first `POOL` looks are learned from, the others are for tests."""
-        return cls(looks[:POOL], looks[POOL:], places)
+    def of(
+        cls, looks: Looks, places: ObjectsSpec, origin: str = '', pool: int = POOL
+    ) -> Materials:
+        """The first `pool` looks are learned from, the others are for tests."""
+        return cls(looks[:pool], looks[pool:], places, origin)
 
 
 @dataclass(frozen=True)
@@ -114,7 +120,8 @@ class Condition:
 
 def _shares(outcomes: Sequence[Outcomes], in_view: bool | None) -> NDArray[np.float64]:
     chosen = [o.success if in_view is None else o.success[o.in_view == in_view] for o in outcomes]
-    return np.array([success.mean() for success in chosen])
+    # A recorded person may never have meant anything out of view.
+    return np.array([success.mean() if len(success) else np.nan for success in chosen])
 
 
 def run_conditions(

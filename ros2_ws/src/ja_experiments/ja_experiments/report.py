@@ -20,7 +20,6 @@ from scipy.stats import binomtest
 from ja_experiments import figures
 from ja_experiments.estimate import Estimate, over_seeds
 from ja_experiments.experiment import BLOCKS, STAGES, Condition
-from ja_experiments.looks import FRESH, POOL
 from ja_experiments.strips import Episode, image_strips, most_telling
 from ja_experiments.study import FEATURED_OBJECTS, OBJECTS, Study
 
@@ -61,7 +60,7 @@ def _pictures(study: Study) -> dict[str, Figure]:
     }
     for name, condition in featured.items():
         pictures[f'figure-6c-{name}'] = figures.attended_pan(condition)
-        chosen = most_telling(study.episodes[name], _STRIP_ROWS)
+        chosen = most_telling(study.episodes.get(name, []), _STRIP_ROWS)
         if chosen:
             pictures[f'figure-7-{name}'] = image_strips(chosen, condition.config)
     for name, variants in study.ablations.items():
@@ -79,8 +78,9 @@ def _markdown(study: Study) -> str:
         .render(
             study=study.config,
             plan=plan,
-            pool=POOL,
-            fresh=FRESH,
+            pool=len(study.materials.pool),
+            fresh=len(study.materials.fresh),
+            origin=study.materials.origin,
             featured=FEATURED_OBJECTS,
             readings=list(study.by_objects),
             strips=[
@@ -93,7 +93,7 @@ def _markdown(study: Study) -> str:
                 'alone': _alone(study),
                 'stages': _stages(study),
                 'pan_and_tilt': _pan_and_tilt(study),
-                'episodes': _episodes(study),
+                'episodes': _episodes(study) if study.episodes else '',
                 'ablations': {name: _ablations(found) for name, found in study.ablations.items()},
                 'seconds': _table(
                     ('part', 'time'), [(part, f'{s:.1f} s') for part, s in study.seconds.items()]

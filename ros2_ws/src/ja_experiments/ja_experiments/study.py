@@ -18,6 +18,7 @@ from ja_experiments.config import READINGS, reading
 from ja_experiments.experiment import Condition, Materials, Plan, run_conditions
 from ja_experiments.looks import FRESH, POOL, load_looks
 from ja_experiments.progress import Progress
+from ja_experiments.recorded import recorded_materials
 from ja_experiments.strips import Episode, watch
 from ja_sim.core.scene import load_scene
 
@@ -30,12 +31,17 @@ FEATURED_OBJECTS = 5
 class StudyConfig:
     """What to compute. No ablations when `ablation_seeds` is 0.
 
-    `looks_seed`: which caregiver is looked at. `episodes`: trials watched for Figure 7.
+    `looks_seed`: which caregiver is looked at. `data`: folder of a recorded data set, in place of
+    a rendered caregiver; then there is no Figure 7, because the world around her is not known.
+    `pool`: looks of the data to learn from; 0: as many as the paper, or four fifths of them.
+    `episodes`: trials watched for Figure 7.
     """
 
     plan: Plan = field(default_factory=Plan)
     scene: str = 'default'
     looks_seed: int = 0
+    data: str = ''
+    pool: int = 0
     episodes: int = 40
     ablation_seeds: int = 0
     workers: int = os.cpu_count() or 1
@@ -46,6 +52,7 @@ class Study:
     """What has been computed; conditions by reading, then by object count or by variant."""
 
     config: StudyConfig
+    materials: Materials
     by_objects: dict[str, dict[int, Condition]]
     episodes: dict[str, list[Episode]]
     ablations: dict[str, dict[str, Condition]]
@@ -61,21 +68,24 @@ def run_study(config: StudyConfig, progress: Progress) -> Study:
     torch.set_num_threads(1)
     seconds: dict[str, float] = {}
     with _timed(seconds, 'looks at the caregiver'):
-        materials = prepare_materials(config.scene, config.looks_seed, progress)
+        if config.data:
+            materials = recorded_materials(Path(config.data), config.pool, config.scene)
+        else:
+            materials = prepare_materials(config.scene, config.looks_seed, progress)
     with _timed(seconds, 'compilation'):
         compile_kernel(materials)
     by_objects, episodes, ablations = {}, {}, {}
     for name in READINGS:
         with _timed(seconds, f'figure 6, pairs: {name}'):
             by_objects[name] = _figure_6(name, config, materials, progress)
-    for name in READINGS:
+    for name in () if config.data else READINGS:
         with _timed(seconds, f'figure 7, pairs: {name}'):
             featured = by_objects[name][FEATURED_OBJECTS]
             episodes[name] = _figure_7(name, featured, config, progress)
     for name in READINGS if config.ablation_seeds else ():
         with _timed(seconds, f'ablations, pairs: {name}'):
             ablations[name] = _ablations(name, config, materials, progress)
-    return Study(config, by_objects, episodes, ablations, seconds)
+    return Study(config, materials, by_objects, episodes, ablations, seconds)
 
 
 @contextmanager
@@ -101,7 +111,11 @@ def prepare_materials(scene: str, looks_seed: int, progress: Progress) -> Materi
     """The looks at the caregiver of a scene, rendered if they are not kept, and its places."""
     with progress.bar('looks at the caregiver', POOL + FRESH) as advance:
         looks = load_looks(scene, looks_seed, say=progress.say, progress=advance)
-    return Materials.of(looks, load_scene(scene).objects)
+    origin = (
+        f'looks at a rendered caregiver (scene `{scene}`, seed {looks_seed}), through the face '
+        'detector and the crop of the live graph'
+    )
+    return Materials.of(looks, load_scene(scene).objects, origin)
 
 
 def _figure_6(

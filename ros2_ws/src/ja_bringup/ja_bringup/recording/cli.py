@@ -1,4 +1,4 @@
-"""The commands `record` and `replay`, for `./ja`."""
+"""The commands `record`, `replay` and `export`, for `./ja`."""
 
 import sys
 from pathlib import Path
@@ -11,6 +11,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands to an app."""
     app.command()(record)
     app.command()(replay)
+    app.command()(export)
 
 
 def record(
@@ -72,9 +73,10 @@ def replay(
     -p learner:=paper -p seed:=3`.
     """
     from ja_bringup.recording.alone import replay as run
-    from ja_bringup.recording.alone import score as run_score
 
     if score:
+        from ja_bringup.recording.over_trials import score as run_score
+
         sys.exit(run_score(recording, csv_file, as_json, context.obj or []))
 
     parameters = {
@@ -83,3 +85,24 @@ def replay(
         'without': ','.join(without or ()),
     }
     sys.exit(run(parameters, context.obj or []))
+
+
+def export(
+    context: typer.Context,
+    recordings: Annotated[
+        list[Path], typer.Argument(help='Recordings: .mcap files, or folders of them.')
+    ],
+    to: Annotated[Path, typer.Option('--to', help='Folder of the data set, which is made.')],
+    licence: Annotated[
+        str, typer.Option(help='What its card says about who may use it, and how.')
+    ] = '',
+) -> None:
+    """Turn recordings into a data set of trials: a Parquet table, PNG faces, and a card.
+
+    Examples: `./ja export runs/X-record --to data/monday`; with the glances of the demo: `./ja
+    export runs/X-record --to data/demo --ros-args -p look_around:=both_sides`; and the paper's
+    experiment on it: `./ja figures --data data/monday`.
+    """
+    from ja_bringup.recording.over_trials import export as run
+
+    sys.exit(run(recordings, to, licence, context.obj or []))

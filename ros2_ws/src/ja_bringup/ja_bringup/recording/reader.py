@@ -2,6 +2,7 @@
 
 import io
 import struct
+import sys
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,6 +61,12 @@ class Recording:
         """The messages of some topics (None: all) in the order they were said."""
         for path in self._paths:
             yield from _File(path).messages(topics)
+
+
+def warn_of_unfinished(recording: Recording) -> None:
+    """Tell, on the terminal, which files end where their recorder died."""
+    for path in recording.unfinished:
+        print(f'{path} was not ended: it is read as far as it goes', file=sys.stderr)
 
 
 class _File:
