@@ -1,4 +1,4 @@
-"""A day as a recorder would have kept it: looks at a caregiver, fixations of what she meant."""
+"""A day as a recorder keeps it: looks at a caregiver, and fixations of what she meant."""
 
 import numpy as np
 

@@ -156,7 +156,7 @@ def _row(number: int, sample: Sample) -> dict[str, Any]:
 def _sample(folder: Path, row: Mapping[str, Any]) -> Sample:
     picture = cv2.imread(str(folder / row['face']), cv2.IMREAD_UNCHANGED)
     try:
-        face = checked_face(picture)
+        face = checked_face(np.asarray(picture))
     except ValueError as error:
         raise ConfigError(f'{folder / row["face"]}: {error}') from None
     lesson = Trial(

@@ -52,11 +52,11 @@ def places_around(looks: Looks, places: ObjectsSpec) -> ObjectsSpec:
     """The scene's places seen from where she was looked at, and wide enough for all she meant."""
     centre = np.degrees(np.median(looks.postures, axis=0))
     meant = np.degrees(looks.directions)
-    ranges = {}
-    for axis, name in enumerate(('pan_deg', 'tilt_deg')):
-        low, high = np.array(getattr(places, name)) + centre[axis]
-        ranges[name] = (
-            float(min(low, meant[:, axis].min())),
-            float(max(high, meant[:, axis].max())),
-        )
-    return replace(places, **ranges)
+
+    def widened(place: tuple[float, float], axis: int) -> tuple[float, float]:
+        low, high = np.add(place, centre[axis])
+        return float(min(low, *meant[:, axis])), float(max(high, *meant[:, axis]))
+
+    return replace(
+        places, pan_deg=widened(places.pan_deg, 0), tilt_deg=widened(places.tilt_deg, 1)
+    )
