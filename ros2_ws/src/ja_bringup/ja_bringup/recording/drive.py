@@ -2,7 +2,7 @@
 
 import os
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
@@ -11,6 +11,7 @@ import rclpy
 from rclpy.context import Context
 from rclpy.serialization import deserialize_message
 
+from ja_bringup.graph import NodeSpec
 from ja_bringup.recording.message_types import message_class
 from ja_bringup.recording.reader import RecordedMessage
 
@@ -24,8 +25,10 @@ class DrivenNode:
     bit. Timers do not run.
     """
 
-    def __init__(self, kind: type, arguments: Sequence[str], context: Context) -> None:
-        self.node = kind(context=context, cli_args=arguments, use_global_arguments=False)
+    def __init__(self, spec: NodeSpec, context: Context) -> None:
+        self.node = spec.load()(
+            context=context, cli_args=spec.ros_arguments(), use_global_arguments=False
+        )
         self._callbacks = defaultdict(list)
         for subscription in self.node.subscriptions:
             self._callbacks[subscription.topic_name].append(subscription.callback)
@@ -53,11 +56,8 @@ class DrivenNode:
 
 
 @contextmanager
-def driven(kind: type, arguments: Sequence[str]) -> Iterator[DrivenNode]:
-    """A node of a class, with ROS arguments from `--ros-args` on.
-
-    It neither finds nor is found by the graph that may run on this machine.
-    """
+def driven(spec: NodeSpec) -> Iterator[DrivenNode]:
+    """A node that neither finds nor is found by the graph that may run on this machine."""
     before = os.environ.get(_RANGE)
     os.environ[_RANGE] = 'OFF'
     context = Context()
@@ -70,7 +70,7 @@ def driven(kind: type, arguments: Sequence[str]) -> Iterator[DrivenNode]:
             os.environ[_RANGE] = before
     node = None
     try:
-        node = DrivenNode(kind, arguments, context)
+        node = DrivenNode(spec, context)
         yield node
     finally:
         if node is not None:

@@ -21,7 +21,6 @@ from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.time_codec import to_ns
 from ja_common.topics import DETECTIONS, FIXATION, GATE_STATUS, JOINT_STATES, LM_DELTA, SIM_TRUTH
 from ja_learning.core.trial import Trial
-from ja_learning.learning_module_node import LearningModuleNode
 from ja_sim.core.score import TruthAt
 from ja_sim.truth_codec import decode_truth
 
@@ -77,24 +76,12 @@ def recorded_trials(
     if lacking:
         raise ConfigError(f'the recording lacks {", ".join(lacking)}: nothing to learn from')
     spec = NodeSpec('ja_learning', 'learning_module', {'lockstep': True}, arguments=arguments)
-    with driven(_Pupil, spec.ros_arguments()) as learner:
+    with driven(spec) as learner:
         witness = _Witness(learner)
         ours = {f'/{topic.name}' for topic in (SIM_TRUTH, GATE_STATUS)}
         for message in recording.messages(learner.hears | ours):
             yield from witness.hear(message.topic.name.lstrip('/'), message)
             progress(message.stamp_ns)
-
-
-class _Pupil(LearningModuleNode):
-    """A learning module that tells which trials it was taught."""
-
-    def __init__(self, **node_kwargs: Any) -> None:
-        self.taught: list[tuple[Trial, int]] = []
-        super().__init__(**node_kwargs)
-
-    def teach(self, trial: Trial, stamp_ns: int) -> None:
-        super().teach(trial, stamp_ns)
-        self.taught.append((trial, stamp_ns))
 
 
 @dataclass(frozen=True)
@@ -111,6 +98,9 @@ class _Witness:
 
     def __init__(self, learner: DrivenNode) -> None:
         self._learner = learner
+        self._teach = learner.node.teach
+        self._taught: list[tuple[Trial, int]] = []
+        learner.node.teach = self._overhear
         value = learner.node.get_parameter
         names = [field.name for field in fields(JointConfig)]
         self._joints = JointCodec(JointConfig(**{name: value(name).value for name in names}))
@@ -134,10 +124,14 @@ class _Witness:
         for said_topic, answer in self._learner.hear(message):
             if said_topic.lstrip('/') == LM_DELTA.name:
                 self._on_proposal(answer)
-        while self._learner.node.taught:
-            trial = self._on_lesson(*self._learner.node.taught.pop(0))
+        while self._taught:
+            trial = self._on_lesson(*self._taught.pop(0))
             if trial is not None:
                 yield trial
+
+    def _overhear(self, lesson: Trial, stamp_ns: int) -> None:
+        self._taught.append((lesson, stamp_ns))
+        self._teach(lesson, stamp_ns)
 
     def _on_proposal(self, message: Any) -> None:
         delta = self._joints.decode(message)
