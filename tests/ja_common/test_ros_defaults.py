@@ -2,7 +2,7 @@
 
 import xml.etree.ElementTree as ElementTree
 
-from ja_common.ros_defaults import ENVIRONMENT, PROFILE, apply_ros_defaults
+from ja_common.ros_defaults import ENVIRONMENT, LEASE_S, PROFILE, apply_ros_defaults
 
 
 def test_silent_user_gets_every_default():
@@ -22,3 +22,9 @@ def test_users_own_settings_win():
 def test_profile_is_shipped_and_readable():
     profile = ElementTree.fromstring(PROFILE.read_text())
     assert [e for e in profile.iter() if e.tag.endswith('segment_size')]
+
+
+def test_lease_is_that_of_the_profile():
+    profile = ElementTree.fromstring(PROFILE.read_text())
+    (lease,) = [e for e in profile.iter() if e.tag.endswith('leaseDuration')]
+    assert float(lease.findtext('{*}sec')) == LEASE_S

@@ -20,6 +20,7 @@ from ja_common.core.config import ConfigError
 from ja_common.core.health import Health, Level
 from ja_common.executor import KeptWaitSetExecutor
 from ja_common.parameters import declare_config
+from ja_common.presence import Presence
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_common.topics import DIAGNOSTICS, Topic
 
@@ -42,6 +43,7 @@ class GraphNode(Node):
         self.said_topics: dict[str, Topic] = {}
         self.offered_services: dict[str, Any] = {}
         self._diagnostics = self.say(DIAGNOSTICS)
+        self._presence = Presence(self, time.monotonic())
         # Wall time, not /clock: a simulation that stands still must be reported as well.
         self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -120,6 +122,8 @@ class GraphNode(Node):
                 log.warning(message)
 
     def _report(self) -> None:
+        if halted_s := self._presence.refresh(time.monotonic()):
+            self.problem('halt', f'this node stood still for {halted_s:.1f} s', Level.WARN)
         silent = self.health.silent(time.monotonic())
         for name in self.heard_topics:
             where = f'silence of {name}'
