@@ -111,3 +111,9 @@ def test_configurations_of_rigs_fit_the_gate(name, ros_context):
     declared = {each: node.get_parameter(each).value for each in parameters}
     node.destroy_node()
     assert declared == parameters
+
+
+def test_on_a_rig_learner_and_gate_keep_what_they_know_side_by_side():
+    kept = {spec.thing: spec.parameters for spec in GRAPHS['bare rig']}
+    checkpoints = Path(kept['learning_module']['checkpoint_folder'])
+    assert Path(kept['gate']['trials_file']).parent == checkpoints.parent

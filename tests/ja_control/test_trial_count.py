@@ -6,11 +6,11 @@ from ja_control.core.trial_count import load_trials, save_trials
 
 
 def test_what_was_saved_is_loaded(tmp_path):
-    path = tmp_path / 'trials'
+    path = tmp_path / 'not' / 'there' / 'yet' / 'trials'
     assert load_trials(path) == 0
     save_trials(path, 120_000)
     assert load_trials(path) == 120_000
-    assert list(tmp_path.iterdir()) == [path]
+    assert list(path.parent.iterdir()) == [path]
 
 
 @pytest.mark.parametrize('content', [b'', b'many', b'-3', b'\xff\x00'])

@@ -17,6 +17,7 @@ def load_trials(path: Path) -> int:
 
 def save_trials(path: Path, trials: int) -> None:
     """Write the count so that at any instant the file is the old or the new one."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f'.{path.name}.{os.getpid()}')
     temporary.write_text(f'{trials}\n', encoding='ascii')
     os.replace(temporary, path)
