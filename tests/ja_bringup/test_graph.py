@@ -14,8 +14,10 @@ from ja_bringup.graph import (
     rig_graph,
     sim_graph,
     split_ros_arguments,
+    swapped,
     with_arguments,
 )
+from ja_common.core.config import ConfigError
 
 
 def test_names_follow_from_the_thing():
@@ -117,3 +119,27 @@ def test_on_a_rig_learner_and_gate_keep_what_they_know_side_by_side():
     kept = {spec.thing: spec.parameters for spec in GRAPHS['bare rig']}
     checkpoints = Path(kept['learning_module']['checkpoint_folder'])
     assert Path(kept['gate']['trials_file']).parent == checkpoints.parent
+
+
+def test_a_node_of_another_package_takes_the_place_and_the_parameters():
+    ours = sim_graph(seed=3)
+    theirs = swapped(ours, ['gate=ja_sim/scorer'])
+    changed = [(a, b) for a, b in zip(ours, theirs, strict=True) if a != b]
+    [(gate, other)] = changed
+    assert (other.package, other.thing) == ('ja_sim', 'scorer')
+    assert other.parameters == gate.parameters
+
+
+@pytest.mark.parametrize(
+    ('swap', 'why'),
+    [
+        ('gat=ja_sim/scorer', "no node 'gat'"),
+        ('gate', 'PACKAGE/THING'),
+        ('gate=scorer', 'PACKAGE/THING'),
+        ('gate=ja_sim/nobody', 'PYTHONPATH'),
+        ('gate=nowhere/scorer', 'PYTHONPATH'),
+    ],
+)
+def test_a_swap_that_cannot_be_is_refused_with_the_reason(swap, why):
+    with pytest.raises(ConfigError, match=why):
+        swapped(sim_graph(), [swap])

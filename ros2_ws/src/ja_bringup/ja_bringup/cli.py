@@ -12,6 +12,7 @@ from ja_bringup.graph import (
     rig_graph,
     sim_graph,
     split_ros_arguments,
+    swapped,
     with_arguments,
 )
 from ja_bringup.inspect_cli import register as register_inspection
@@ -48,6 +49,10 @@ OnDeathOption = Annotated[OnDeathChoice, typer.Option(help='What to do when a no
 OneProcess = Annotated[bool, typer.Option('--one-process', help='All nodes in one process.')]
 Record = Annotated[bool, typer.Option('--record', help='Record all topics into runs/.')]
 View = Annotated[bool, typer.Option(help='Serve the live page, and print its address.')]
+Swap = Annotated[
+    list[str] | None,
+    typer.Option(help='A node of yours for one of ours: gate=my_lab/my_gate. Several times.'),
+]
 TimeOption = Annotated[float, typer.Option('--time', min=0.0, help='End after so many seconds.')]
 
 
@@ -77,6 +82,7 @@ def demo(
     resume: Annotated[
         Path | None, typer.Option(help='Go on from what was learned in this run, in its folder.')
     ] = None,
+    swap: Swap = None,
     record: Record = False,
     one_process: OneProcess = False,
     view: View = True,
@@ -86,7 +92,7 @@ def demo(
     from ja_bringup.course import standard_course
     from ja_bringup.demo import run_demo
 
-    graph = sim_graph(seed, {'scene': scene}, learner.value)
+    graph = swapped(sim_graph(seed, {'scene': scene}, learner.value), swap or ())
     stages = standard_course(trials or PRACTICE_TRIALS[learner.value], time_s, exam_trials)
     graph = with_arguments([*[RECORDER] * record, *graph], context.obj or [])
     sys.exit(run_demo(graph, stages, one_process, on_death.value, context.obj or [], view, resume))
@@ -103,6 +109,7 @@ def rig(
         ),
     ] = None,
     time_s: TimeOption = 0.0,
+    swap: Swap = None,
     record: Record = False,
     one_process: OneProcess = False,
     view: View = True,
@@ -113,7 +120,7 @@ def rig(
 
     arguments = context.obj or []
     code, _ = run_graph(
-        with_arguments([*[RECORDER] * record, *rig_graph(source)], arguments),
+        with_arguments([*[RECORDER] * record, *swapped(rig_graph(source), swap or ())], arguments),
         new_run_folder('rig'),
         'Joint attention, on real pictures',
         lambda node: 0.0 < time_s < node.elapsed_s,

@@ -1,6 +1,7 @@
 """A graph as data: which nodes, with which parameters and remappings."""
 
 import importlib
+import importlib.util
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+
+from ja_common.core.config import ConfigError
 
 CONFIG = Path(str(files('ja_bringup'))) / 'config'
 
@@ -79,6 +82,40 @@ def split_ros_arguments(argv: Sequence[str]) -> tuple[list[str], list[str]]:
 def with_arguments(graph: Sequence[NodeSpec], arguments: Sequence[str]) -> list[NodeSpec]:
     """The graph with further ROS arguments for every node."""
     return [replace(node, arguments=[*node.arguments, *arguments]) for node in graph]
+
+
+def swapped(graph: Sequence[NodeSpec], swaps: Sequence[str]) -> list[NodeSpec]:
+    """The graph with nodes of other packages in the place of ours: `gate=my_lab/my_gate`.
+
+    The other node (`my_lab/my_gate_node.py`, class `MyGateNode`) gets the same parameters and
+    remappings. Raises ConfigError for a node that is not there.
+    """
+    others: dict[str, tuple[str, str]] = {}
+    for swap in swaps:
+        ours, _, theirs = swap.partition('=')
+        package, _, thing = theirs.partition('/')
+        if ours not in {node.thing for node in graph}:
+            there = ', '.join(node.thing for node in graph)
+            raise ConfigError(f'{swap}: no node {ours!r} in this graph; there are {there}')
+        if not (package and thing and _is_there(f'{package}.{thing}_node')):
+            raise ConfigError(
+                f'{swap}: behind = belongs PACKAGE/THING, with a file PACKAGE/THING_node.py that '
+                'Python finds (PYTHONPATH)'
+            )
+        others[ours] = package, thing
+    return [
+        replace(node, package=others[node.thing][0], thing=others[node.thing][1])
+        if node.thing in others
+        else node
+        for node in graph
+    ]
+
+
+def _is_there(module: str) -> bool:
+    try:
+        return importlib.util.find_spec(module) is not None
+    except ModuleNotFoundError:  # the package itself
+        return False
 
 
 def preset(path: Path, thing: str) -> dict[str, Any]:

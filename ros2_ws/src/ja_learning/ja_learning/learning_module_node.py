@@ -72,7 +72,7 @@ class LearningModuleNode(GraphNode):
         self._joints = JointCodec(self.configure(JointConfig))
         self._learning = self._config.learning_enabled_at_start
         torch.set_num_threads(1)  # on networks this small, threads wait for each other
-        self._learner = KeptLearner(self, self._untaught, self._config.lockstep)
+        self._learner = KeptLearner(self, self.untaught, self._config.lockstep)
         self._module = LearningModule(
             lambda: self._learner.predictor,
             self.configure(LookAroundConfig),
@@ -95,7 +95,8 @@ class LearningModuleNode(GraphNode):
         self.offer(Trigger, 'reset_learning', self._on_reset)
         self.offer(SetBool, 'learning_enabled', self._on_learning_enabled)
 
-    def _untaught(self) -> Learner:
+    def untaught(self) -> Learner:
+        """The learner that this node teaches, before its first lesson."""
         return make_learner(
             self._choice, self._network_config, self._gaze_line_config, self._config.seed
         )
