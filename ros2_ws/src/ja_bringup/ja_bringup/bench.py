@@ -46,7 +46,8 @@ def run_benchmarks(name: str | None, json_file: Path | None) -> int:
         raise ConfigError(f'{json_file}: there is no folder {json_file.absolute().parent}')
     figures: dict[str, Row] = {}
     for each in [name] if name else known:
-        rows = importlib.import_module(known[each]).run()
+        with Console(stderr=True).status(f'bench {each} ...'):
+            rows = importlib.import_module(known[each]).run()
         Console().print(table_of(each, rows))
         figures |= {f'{each}/{figure}': row for figure, row in rows.items()}
         if json_file is not None:  # after each: an interrupted run keeps what it has

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ja_bringup.bench import benchmarks
+from ja_bringup.examples import show_examples
 from ja_bringup.graph import (
     RECORDER,
     rig_graph,
@@ -24,6 +26,8 @@ from ja_experiments.cli import register as register_experiments
 app = typer.Typer(
     help='A camera head that learns joint attention, on ROS 2. ROS arguments go behind '
     '`--ros-args`, as for any node: -r, -p, --params-file, __ns.',
+    epilog='`./ja COMMAND --help` shows examples. The tests: `./ja test`, which takes the '
+    'arguments of pytest.',
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
@@ -134,7 +138,13 @@ def rig(
 
 @app.command()
 def bench(
-    name: Annotated[str | None, typer.Argument(help='Which one; all of them without it.')] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            help='Which one; all of them without it.',
+            autocompletion=lambda: list(benchmarks()),
+        ),
+    ] = None,
     json_file: Annotated[
         Path | None, typer.Option('--json', help='Write the figures to this file.')
     ] = None,
@@ -150,15 +160,20 @@ def reference(
     folder: Annotated[Path, typer.Option(help='Where the pages go.')] = Path('docs'),
 ) -> None:
     """Write topics.md and parameters.md from the running code."""
+    from rich.console import Console
+
     from ja_bringup.reference import write_reference
 
-    for page in write_reference(folder):
+    with Console(stderr=True).status('asking every node ...'):
+        pages = write_reference(folder)
+    for page in pages:
         typer.echo(page)
 
 
 register_experiments(app)
 register_recording(app)
 register_inspection(app)
+show_examples(app)
 
 
 def main() -> None:

@@ -17,10 +17,7 @@ def register(app: typer.Typer) -> None:
 
 
 def doctor(as_json: Json = False) -> None:
-    """Check this machine, and say how to mend what is wrong. Exit code 1 if the demo cannot run.
-
-    Examples: `./ja doctor`; `./ja doctor --json | jq '.[] | select(.well | not)'`.
-    """
+    """Check this machine, and say how to mend what is wrong; exit code 1: no demo can run."""
     from rich.console import Console
 
     from ja_bringup.doctor import checks
@@ -48,10 +45,7 @@ def topics(
     ] = 2.0,
     as_json: Json = False,
 ) -> None:
-    """List what the running graph says: type, quality of service, who, how often, what for.
-
-    Examples: `./ja topics`; `ROS_DOMAIN_ID=7 ./ja topics --time 10 --json`.
-    """
+    """List what the running graph says: type, quality of service, who, how often, what for."""
     from rich.console import Console
 
     from ja_bringup.run import check_ros_arguments

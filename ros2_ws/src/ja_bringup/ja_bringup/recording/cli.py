@@ -32,11 +32,7 @@ def record(
         float, typer.Option(min=0.0, help='Drop files older than so many seconds; 0: keep all.')
     ] = 0.0,
 ) -> None:
-    """Record every topic of the running graph, whatever its type, as MCAP.
-
-    Examples: `./ja record`; `./ja record --exclude 'image|rosout' --time 60`; bounded to the last
-    hour: `./ja record --keep-s 3600 --ros-args -p split_s:=60.0`.
-    """
+    """Record every topic of the running graph, whatever its type, as MCAP."""
     from ja_bringup.recording.alone import record as run
 
     parameters = {
@@ -65,13 +61,7 @@ def replay(
     ] = None,
     as_json: Annotated[bool, typer.Option('--json', help='With --score: print JSON.')] = False,
 ) -> None:
-    """Publish a recording again, with /clock, for a node to be tried on it.
-
-    Examples: `./ja replay runs/X-record --speed 2`; another detector on the recorded pictures:
-    `./ja replay runs/X-record --without detections --without face_image`; another learner over
-    the recorded trials, as fast as it goes: `./ja replay runs/X-record --score --ros-args
-    -p learner:=paper -p seed:=3`.
-    """
+    """Publish a recording again, with /clock, for a node to be tried on it."""
     from ja_bringup.recording.alone import replay as run
 
     if score:
@@ -97,12 +87,7 @@ def export(
         str, typer.Option(help='What its card says about who may use it, and how.')
     ] = '',
 ) -> None:
-    """Turn recordings into a data set of trials: a Parquet table, PNG faces, and a card.
-
-    Examples: `./ja export runs/X-record --to data/monday`; with the glances of the demo: `./ja
-    export runs/X-record --to data/demo --ros-args -p look_around:=both_sides`; and the paper's
-    experiment on it: `./ja figures --data data/monday`.
-    """
+    """Turn recordings into a data set of trials: a Parquet table, PNG faces, and a card."""
     from ja_bringup.recording.over_trials import export as run
 
     sys.exit(run(recordings, to, licence, context.obj or []))

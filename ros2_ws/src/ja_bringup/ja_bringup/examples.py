@@ -1,0 +1,71 @@
+"""An example or two for every command: the end of its `--help`, and what a test tries to parse."""
+
+import typer
+
+EXAMPLES: dict[str, dict[str, str]] = {
+    'demo': {
+        './ja demo': 'one minute: exam, practice, exam',
+        './ja demo --learner paper --trials 2000 --time 600': "the paper's network needs more",
+        './ja demo --scene default --record --one-process': 'a harder scene, all of it recorded',
+        './ja demo --resume runs/X-demo': 'go on from what an earlier run has learned',
+        './ja demo --swap gate=my_lab/my_gate --ros-args -p max_shifts:=3': 'a node of yours',
+    },
+    'rig': {
+        './ja rig --source 0': 'a webcam, and a digital head in its picture',
+        './ja rig --source walk.mp4 --time 60 --no-view': 'a video file',
+        './ja rig --record --ros-args -r image_raw:=/camera/image_raw': 'your camera and motors',
+    },
+    'figures': {
+        './ja figures --trials 30000 --seeds 3': 'a tenth of the paper, in a minute',
+        './ja figures --ablations 5 --output runs/paper': 'all, and what the paper leaves open',
+        './ja figures --data data/monday': 'on recorded faces (./ja export)',
+    },
+    'sweep': {
+        './ja sweep grid.yaml --workers 2': 'a grid of experiments; run again, it goes on',
+        './ja sweep grid.yaml --scheduler tcp://cluster:8786': 'on a Dask cluster',
+    },
+    'bench': {
+        './ja bench': 'everything; takes a while',
+        './ja bench recording --json figures.json': 'one of them, for a script too',
+    },
+    'reference': {
+        './ja reference': 'after a change of a topic or a parameter',
+        './ja reference --folder preview': 'to look at it first',
+    },
+    'record': {
+        './ja record': 'until Ctrl-C, into runs/<time>-record',
+        "./ja record --exclude 'image|rosout' --time 60": 'a minute without pictures and log',
+        './ja record --keep-s 3600 --ros-args -p split_s:=60.0': 'always the last hour',
+    },
+    'replay': {
+        './ja replay runs/X-record --speed 2': 'everything again, twice as fast',
+        './ja replay runs/X-record --without detections --without face_image': 'for your detector',
+        './ja replay runs/X-record --score --ros-args -p learner:=paper -p seed:=3': 'its curve',
+        './ja replay runs/X-record --score --json': 'the same for a script',
+    },
+    'export': {
+        './ja export runs/X-record --to data/monday': 'one recording',
+        './ja export runs/X-record runs/Y-record --to data/both --licence CC-BY-4.0': 'several',
+        './ja export runs/X-record --to data/demo --ros-args -p look_around:=both_sides': (
+            'of ./ja demo --record, whose robot glances aside'
+        ),
+    },
+    'doctor': {
+        './ja doctor': 'what is wrong, and how to mend it',
+        "./ja doctor --json | jq '.[] | select(.well | not)'": 'only what is wrong',
+    },
+    'topics': {
+        './ja topics': 'of the graph in this ROS_DOMAIN_ID',
+        'ROS_DOMAIN_ID=7 ./ja topics --time 10 --json': 'of another one, counted for longer',
+    },
+}
+"""By command: lines to type, and what each is for."""
+
+
+def show_examples(app: typer.Typer) -> None:
+    """Put them below the options of every command that is registered."""
+    for command in app.registered_commands:
+        name = command.name or command.callback.__name__  # type: ignore[union-attr]
+        lines = [f'{line}   # {purpose}' for line, purpose in EXAMPLES.get(name, {}).items()]
+        # Each a paragraph: lines would be filled.
+        command.epilog = '\n\n'.join(['Examples:', *lines])
