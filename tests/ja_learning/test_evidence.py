@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ja_learning.core.evidence import Evidence
+from ja_learning.core.evidence import ChangeAlarm, Evidence
 from ja_learning.core.trial import FACE_SHAPE
 
 
@@ -70,3 +70,27 @@ def test_restored_evidence_goes_on_as_before():
     assert weighed(one, 5, knowing, 1) == weighed(other, 5, knowing, 1)
     with pytest.raises(ValueError, match='finite'):
         other.restore(one.state() | {'evidence.nats': np.array([np.nan])})
+
+
+def test_a_change_is_noticed_soon_and_no_bad_luck_is_taken_for_one():
+    rng = np.random.default_rng(0)
+
+    def trials_to_alarm(log_ratios):
+        alarm = ChangeAlarm()
+        for trial, ratio in enumerate(log_ratios, 1):
+            if alarm.raised_by(ratio, knew=True):
+                return trial, alarm.doubtful_trials
+        return None, alarm.doubtful_trials
+
+    # A caregiver who is elsewhere in three trials of ten says little, and never enough.
+    elsewhere = rng.random(2000) < 0.3
+    assert trials_to_alarm(np.where(elsewhere, -1.3, 1.1))[0] is None
+    before, after = np.full(100, 1.0), np.full(60, -1.7)
+    noticed, since = trials_to_alarm(np.concatenate([before, after]))
+    assert 100 < noticed <= 120
+    assert since == noticed - 100, 'it knows when the change was'
+
+
+def test_who_never_knew_anything_is_alarmed_by_nothing():
+    alarm = ChangeAlarm()
+    assert not any(alarm.raised_by(-2.0, knew=False) for _ in range(100))

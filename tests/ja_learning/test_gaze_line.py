@@ -106,7 +106,7 @@ def test_depth_is_uncertain_along_the_line_of_gaze_and_not_across():
 def test_it_learns_which_object_was_meant_though_nobody_tells(learner):
     rng = np.random.default_rng(0)
     before = share_right(learner, rng)
-    for _ in range(150):
+    for _ in range(100):
         learner.learn(lived_trial(rng)[0])
     assert before < 0.5
     assert share_right(learner, rng) > 0.85
@@ -116,13 +116,31 @@ def test_it_learns_which_object_was_meant_though_nobody_tells(learner):
 def test_faces_that_tell_nothing_give_no_evidence(learner):
     rng = np.random.default_rng(6)
     highest = 0.0
-    for _ in range(120):
+    for _ in range(70):
         trial, _ = lived_trial(rng)
         other, _ = lived_trial(rng)
         learner.learn(dataclasses.replace(trial, face=other.face))
         highest = max(highest, learner.log_evidence)
-    assert learner.trials == 120
+    assert learner.trials == 70
     assert highest < np.log(20)
+
+
+def test_when_the_world_is_mirrored_it_is_learned_anew(learner):
+    rng = np.random.default_rng(8)
+
+    def live(trials, mirrored):
+        for _ in range(trials):
+            trial, _ = lived_trial(rng)
+            face = trial.face[:, ::-1] if mirrored else trial.face
+            learner.learn(dataclasses.replace(trial, face=np.ascontiguousarray(face)))
+
+    live(60, mirrored=False)
+    knew = learner.log_evidence
+    live(30, mirrored=True)
+    assert learner.log_evidence < knew / 2, 'what it knew is wrong now, and it says so'
+    live(70, mirrored=True)
+    assert learner.log_evidence > 20
+    assert len(learner.state()['faces']) < 120, 'what was lived before the change is forgotten'
 
 
 def test_a_snapshot_stays_as_it_was_while_the_learner_goes_on(learner):

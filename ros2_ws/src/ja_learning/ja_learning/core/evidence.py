@@ -23,6 +23,8 @@ from ja_learning.core.trial import FACE_SHAPE
 
 _OTHERS = 15
 _FADES_OVER_TRIALS = 100.0
+# A caregiver who is often elsewhere raises doubt, too; this much she hardly ever does.
+_DOUBT_OF_A_CHANGE = 25.0
 # A mixture with 1, itself an e-value: one trial in which none was meant may not undo ten others.
 _SHARE_OF_CHANCE = 0.1
 
@@ -66,3 +68,29 @@ class Evidence:
         if faces.dtype != np.uint8 or faces.shape != (min(len(faces), _OTHERS), *FACE_SHAPE):
             raise ValueError(f'evidence cannot be over faces of shape {faces.shape}')
         self.nats, self._others = nats.astype(float), list(faces.copy())
+
+
+class ChangeAlarm:
+    """Has the world changed under a learner that knew? A cumulative sum (Page 1954) of its losses.
+
+    The doubt [nats] grows by what a trial says against the learner, and is never below zero; the
+    trials since it was last zero are those since the change.
+    """
+
+    def __init__(self) -> None:
+        self.doubt = 0.0
+        self.doubtful_trials = 0
+
+    def raised_by(self, log_ratio: float, knew: bool) -> bool:
+        """Take in a trial's log ratio [nats]; is it a change? `knew`: it knew before."""
+        if self.doubt == 0.0:
+            self.doubtful_trials = 0
+            if not knew:
+                return False
+        self.doubt = max(0.0, self.doubt - log_ratio)
+        self.doubtful_trials += 1
+        return self.doubt > _DOUBT_OF_A_CHANGE
+
+    def reset(self) -> None:
+        """The learner begins anew."""
+        self.doubt, self.doubtful_trials = 0.0, 0

@@ -9,7 +9,9 @@ Early in life the likelihood is tempered (deterministic annealing), or the first
 confirm themselves. How fast one may cool, nobody can know: so several members learn side by side,
 from slow to hasty, and are weighed by the evidence that each has for itself (`evidence`). One that
 fell for its own guesses - the mirrored gaze is the classical error - has evidence against it, and
-is overwritten by the best.
+is overwritten by the best. If the evidence turns against all of them, the world has changed (a
+new caregiver, a camera the other way round): what came before is forgotten, and learning begins
+anew, for half of the members from nothing.
 """
 
 import copy
@@ -22,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 from torch import nn
 
 from ja_common.core.config import parameter
-from ja_learning.core.evidence import Evidence
+from ja_learning.core.evidence import ChangeAlarm, Evidence
 from ja_learning.core.gaze_line_belief import GazeLineBelief
 from ja_learning.core.gaze_line_network import (
     ANGLE_SCALE_RAD,
@@ -39,8 +41,11 @@ _HASTIEST, _SLOWEST = 0.25, 2.0
 _COLDNESS_AT_FIRST = 0.1
 # If none was meant, the place is anywhere in a field of 80 x 30 degrees: 2 x 0.75 units.
 _FIELD = 1.5
+# How differently a face is replayed: its size (a share), its place, its pixels (in deviations).
+_VARIED_SIZE, _VARIED_PLACE_PIXELS, _VARIED_LIGHT = 0.1, 1.0, 0.3
 _COMPARED_EVERY_TRIALS = 10
 _BEATEN_BY_NATS = 15.0
+_CLEAR_NATS = 10.0
 
 
 @dataclass(frozen=True)
@@ -52,7 +57,7 @@ class GazeLineConfig:
     replay_batch: int = parameter(32, 'trials a gradient step', low=1, high=4096)
     replay_memory: int = parameter(5000, 'trials kept for replay', low=1, high=100000)
     step_size: float = parameter(0.003, 'step size of AdamW', low=1e-6, high=1.0)
-    channels: int = parameter(16, 'channels of the first convolution', low=1, high=256)
+    channels: int = parameter(8, 'channels of the first convolution', low=1, high=256)
     none_was_meant: float = parameter(
         0.05, 'prior probability that none of the candidates was meant', low=1e-4, high=0.9
     )
@@ -76,20 +81,18 @@ class GazeLineLearner:
 
     def __init__(self, config: GazeLineConfig, seed: int) -> None:
         self.config = config
-        # The seed's own generator: nobody else's random numbers change this learner.
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
-            self._network = GazeLineNetwork(config.members, config.channels)
+        self._network = _untaught(config, seed)
         self._random = torch.Generator().manual_seed(seed)
         # Proposals come from the running mean of the weights, which is steadier than the last.
         self._mean = copy.deepcopy(self._network).requires_grad_(False)
         self._optimiser = torch.optim.AdamW(
             self._network.parameters(), lr=config.step_size, weight_decay=1e-3
         )
-        self._annealing = np.geomspace(_HASTIEST, _SLOWEST, config.members)
+        self._annealing = _annealing(config.members)
         self._memory = ReplayMemory(config.replay_memory)
         # Of each member, and of their mixture.
         self._evidence = Evidence(config.members + 1)
+        self._alarm = ChangeAlarm()
         self._steps = 0
         self.trials = 0
         self.last_error_rad = float('nan')
@@ -127,9 +130,12 @@ class GazeLineLearner:
         if not len(trial.candidates):
             return
         places = ((trial.candidates - trial.postures[0]) / ANGLE_SCALE_RAD).astype(np.float32)
+        changed = False
         if trial.seen_before_shift:
-            self._weigh(trial.face, places[: trial.seen_before_shift])
+            changed = self._weigh(trial.face, places[: trial.seen_before_shift])
         self._memory.add(trial.face, places)
+        if changed:
+            self._begin_anew(self._alarm.doubtful_trials)
         for _ in range(self.config.replay_steps):
             self._step()
         if self.trials % _COMPARED_EVERY_TRIALS == 0:
@@ -148,7 +154,9 @@ class GazeLineLearner:
         nats = self._evidence.nats[:-1]
         return nats - np.logaddexp.reduce(nats)
 
-    def _weigh(self, face: NDArray[np.uint8], places: NDArray[np.float32]) -> None:
+    def _weigh(self, face: NDArray[np.uint8], places: NDArray[np.float32]) -> bool:
+        """Weigh what was seen; whether it is clear by now that the world has changed."""
+
         def log_probability(faces: NDArray[np.uint8]) -> NDArray[np.float64]:
             with torch.no_grad():
                 gaze = self._mean.gaze(standardised(faces[:, None]))
@@ -158,7 +166,9 @@ class GazeLineLearner:
             mixed = np.logaddexp.reduce(of_members + self._log_weights()[:, None], axis=0)
             return np.concatenate([of_members, mixed[None]])
 
-        self._evidence.weigh(face, log_probability)
+        knew = self.log_evidence > _CLEAR_NATS
+        log_ratio = float(self._evidence.weigh(face, log_probability)[-1])
+        return self._alarm.raised_by(log_ratio, knew)
 
     def _step(self) -> None:
         members, known = self.config.members, len(self._memory)
@@ -180,10 +190,24 @@ class GazeLineLearner:
                 mean.lerp_(now, 1 - keep)
 
     def _varied(self, faces: torch.Tensor) -> torch.Tensor:
-        """The faces a little otherwise, as another look would show them: noise, a pixel aside."""
-        noise = 0.1 * torch.randn(faces.shape, generator=self._random)
-        rows, columns = torch.randint(-1, 2, (2,), generator=self._random).tolist()
-        return torch.roll(faces + noise, (rows, columns), dims=(2, 3))
+        """Each of faces (n, members, 30, 25) a little otherwise, as another look would show it.
+
+        Without it every member learns the remembered faces by heart, and the evidence says so.
+        """
+        pictures = faces.reshape(-1, 1, *faces.shape[-2:])
+        scale, *shift = 2 * torch.rand((3, len(pictures)), generator=self._random) - 1
+        maps = torch.zeros(len(pictures), 2, 3)
+        maps[:, 0, 0] = maps[:, 1, 1] = 1 + _VARIED_SIZE * scale
+        # In units of half a picture, x before y.
+        for axis, pixels in enumerate((faces.shape[-1], faces.shape[-2])):
+            maps[:, axis, 2] = 2 / pixels * _VARIED_PLACE_PIXELS * shift[axis]
+        grid = nn.functional.affine_grid(maps, list(pictures.shape), align_corners=False)
+        moved = nn.functional.grid_sample(
+            pictures, grid, padding_mode='border', align_corners=False
+        )
+        return moved.reshape(faces.shape) + _VARIED_LIGHT * torch.randn(
+            faces.shape, generator=self._random
+        )
 
     def _loss(self, faces: torch.Tensor, places: torch.Tensor) -> torch.Tensor:
         """Minus the tempered log likelihood that one of the candidates, or none, was meant."""
@@ -204,6 +228,22 @@ class GazeLineLearner:
         cooled = len(self._memory) / (self._annealing * max(typical, 1.0) ** 2)
         coldness = np.minimum(1.0, _COLDNESS_AT_FIRST + (1 - _COLDNESS_AT_FIRST) * cooled)
         return torch.from_numpy(coldness.astype(np.float32))
+
+    def _begin_anew(self, newest: int) -> None:
+        """Keep only so many newest trials; every second member forgets all that it knows."""
+        self._memory.keep_newest(newest)
+        self._alarm.reset()
+        self._evidence.nats[:] = 0.0
+        members = self.config.members
+        self._annealing = _annealing(members)
+        seed = int(torch.randint(2**62, (), generator=self._random))
+        fresh = _untaught(self.config, seed)
+        with torch.no_grad():
+            for network in (self._network, self._mean):
+                for old, new in zip(network.parameters(), fresh.parameters(), strict=True):
+                    old.reshape(members, -1)[::2] = new.reshape(members, -1)[::2]
+        self._optimiser.state.clear()
+        self._steps = 0
 
     def _replace_the_beaten(self) -> None:
         """Overwrite the worst member by the best, if the evidence between them is clear."""
@@ -231,6 +271,8 @@ class GazeLineLearner:
         arrays['random'] = self._random.get_state().numpy()
         arrays['steps'], arrays['trials'] = np.array(self._steps), np.array(self.trials)
         arrays['annealing'] = self._annealing.copy()
+        arrays['doubt'] = np.array(self._alarm.doubt)
+        arrays['doubtful_trials'] = np.array(self._alarm.doubtful_trials)
         return arrays | self._memory.state() | self._evidence.state()
 
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
@@ -247,6 +289,7 @@ class GazeLineLearner:
             evidence = Evidence(self.config.members + 1)
             evidence.restore(arrays)
             steps, trials = int(arrays['steps']), int(arrays['trials'])
+            doubt, doubtful = float(arrays['doubt']), int(arrays['doubtful_trials'])
             annealing = arrays['annealing'].reshape(self.config.members).copy()
             random = torch.Generator()
             random.set_state(torch.from_numpy(arrays['random'].copy()))
@@ -263,6 +306,18 @@ class GazeLineLearner:
                     k: torch.from_numpy(np.array(v)) for k, v in kept.items()
                 }
         self._steps, self.trials, self._annealing = steps, trials, annealing
+        self._alarm.doubt, self._alarm.doubtful_trials = doubt, doubtful
+
+
+def _untaught(config: GazeLineConfig, seed: int) -> GazeLineNetwork:
+    # The seed's own generator: nobody else's random numbers change this learner.
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        return GazeLineNetwork(config.members, config.channels)
+
+
+def _annealing(members: int) -> NDArray[np.float64]:
+    return np.geomspace(_HASTIEST, _SLOWEST, members)
 
 
 def _loaded(
