@@ -276,7 +276,7 @@ class Border:
             return Hold(Cause.STALLED, text)
         if not self._engaged and self.limits.excess_rad(self._measured) > c.outside_rad:
             text = f'the head stands more than {c.outside_rad:g} rad outside its limits'
-            return Hold(Cause.OUTSIDE, f'{text}: {self._measured.round(3).tolist()}')
+            return Hold(Cause.OUTSIDE, f'{text}: {self._measured[0]:.3g}, {self._measured[1]:.3g}')
         return None
 
     def _does_not_follow(self) -> bool:
