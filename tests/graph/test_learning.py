@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 SEEDS = (1, 2, 3)
-OBJECTS = 3
 
 
 def learner_alone(learner: str, seed: int, folder: Path) -> dict[str, float]:
@@ -37,8 +36,8 @@ def interval(values: NDArray[np.float64]) -> tuple[float, float]:
 
 
 @pytest.mark.learning
-@pytest.mark.parametrize('learner', ['gaze_line', 'paper'])
-def test_the_learner_alone_beats_its_start_and_chance(learner, domain, tmp_path):
+@pytest.mark.parametrize(('learner', 'objects'), [('gaze_line', 5), ('paper', 3)])
+def test_the_learner_alone_beats_its_start_and_chance(learner, objects, domain, tmp_path):
     exams = []
     for seed in SEEDS:
         folder = tmp_path / str(seed)
@@ -48,4 +47,4 @@ def test_the_learner_alone_beats_its_start_and_chance(learner, domain, tmp_path)
     after = np.array([exam['exam after'] for exam in exams])
     print(f'\n{learner} alone, before: {before}, after: {after}')
     assert interval(after - before)[0] > 0
-    assert interval(after)[0] > 1 / OBJECTS
+    assert interval(after)[0] > 1 / objects

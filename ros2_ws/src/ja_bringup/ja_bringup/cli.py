@@ -47,6 +47,9 @@ class LearnerChoice(str, Enum):
     paper = 'paper'
 
 
+SCENE = {'gaze_line': 'default', 'paper': 'easy'}
+"""Five objects around the caregiver; or three, all in the first view, for who needs thousands."""
+
 PRACTICE_TRIALS = {'gaze_line': 300, 'paper': 2000}
 
 OnDeathOption = Annotated[OnDeathChoice, typer.Option(help='What to do when a node dies.')]
@@ -82,7 +85,13 @@ def demo(
         typer.Option('--exam', min=0, help='Trials of the learner alone at the end; 0: no exams.'),
     ] = 100,
     seed: Annotated[int, typer.Option(min=0, help='Seed of the world and of the robot.')] = 0,
-    scene: Annotated[str, typer.Option(help='Scene of the sim, by name or file.')] = 'easy',
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            help=f'Scene of the sim, by name or file; by default {SCENE["gaze_line"]}, or with '
+            f"the paper's learner {SCENE['paper']}."
+        ),
+    ] = None,
     resume: Annotated[
         Path | None, typer.Option(help='Go on from what was learned in this run, in its folder.')
     ] = None,
@@ -96,6 +105,7 @@ def demo(
     from ja_bringup.course import standard_course
     from ja_bringup.demo import run_demo
 
+    scene = scene or SCENE[learner.value]
     graph = swapped(sim_graph(seed, {'scene': scene}, learner.value), swap or ())
     stages = standard_course(trials or PRACTICE_TRIALS[learner.value], time_s, exam_trials)
     graph = with_arguments([*[RECORDER] * record, *graph], context.obj or [])
