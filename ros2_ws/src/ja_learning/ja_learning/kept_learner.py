@@ -69,7 +69,7 @@ class KeptLearner:
         for error in self._lessons.troubles():
             self._node.problem('learning', f'learning: {error}')
         if waiting > MANY_WAITING:
-            text = f'{waiting} trials wait to be learned: give each fewer steps of replay'
+            text = f'more than {MANY_WAITING} trials wait to be learned: replay less after each'
             self._node.problem('waiting', text, Level.WARN)
 
     def close(self) -> None:

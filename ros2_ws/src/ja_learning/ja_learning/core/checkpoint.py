@@ -3,6 +3,7 @@
 import json
 import os
 import zipfile
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -75,5 +76,6 @@ def load_checkpoint(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]
     return arrays, description
 
 
+@cache
 def _versions() -> dict[str, str]:
     return {name: version(name) for name in ('ja_learning', 'torch', 'numpy')}
