@@ -19,7 +19,7 @@ MANY_WAITING = 10
 BEHIND_IN_LOCKSTEP = 1
 """Learning a trial may take as long as living the next one, on another processor."""
 
-CLOSING_S = 2.0
+CLOSING_S = 1.0
 """So long may learning go on when the node is asked to end [s]; then comes the last checkpoint."""
 
 

@@ -63,8 +63,10 @@ class BackgroundLearner:
 
     def close(self, patience_s: float) -> Learner:
         """Learn what was handed over, if it takes no longer [s], and give the learner back."""
-        wait(self._lessons, timeout=patience_s)
-        self._thread.shutdown(cancel_futures=True)
+        try:
+            wait(self._lessons, timeout=patience_s)
+        finally:  # a second Ctrl-C: without this the thread would still learn all that waits
+            self._thread.shutdown(cancel_futures=True)
         return self._learner
 
     def _may_show(self) -> bool:
