@@ -4,7 +4,7 @@ Every node is started once in a private context, and asked what it hears, says, 
 """
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,12 +16,17 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock
 
 from ja_bringup.graph import NodeSpec
+from ja_bringup.recorder_node import RecorderConfig
+from ja_bringup.recording.qos_text import offered_text
+from ja_bringup.recording.recording_folder import Channel, Limits, RecordingFolder
 from ja_bringup.sros_policy import policy_xml
 from ja_common.graph_node import GraphNode
 from ja_common.parameters import UNBOUNDED
-from ja_common.topics import TOPICS
+from ja_common.topics import CLOCK, TOPICS
 
 NODES = (
     NodeSpec('ja_perception', 'camera'),
@@ -34,6 +39,15 @@ NODES = (
     NodeSpec('ja_sim', 'scorer'),
     NodeSpec('ja_sim', 'digital_head'),
 )
+COMPANIONS = (
+    NodeSpec('ja_bringup', 'view'),
+    NodeSpec('ja_bringup', 'recorder'),
+    NodeSpec('ja_bringup', 'player'),
+)
+"""Beside the graph, and no part of it: what they hear and say is whatever there is."""
+
+# Parameters that have no default which a node could start with.
+_MUST_BE_GIVEN = ('source', 'recording')
 # What rclpy declares by itself on every node.
 _NOT_OURS = ('use_sim_time', 'start_type_description_service')
 
@@ -42,7 +56,8 @@ _TOPICS_HEAD = """# Topics and services
 Made by `./ja reference` from the code; do not edit. All names are relative (namespaces and remaps
 work) but `/clock` and `/diagnostics`. The stamp of an image goes unchanged through everything that
 follows from it. Every image gets one message on each topic of the loop, an empty one where there
-is nothing to say.
+is nothing to say. Beside the graph, `recorder` hears every topic, `player` says again what was
+recorded, and `view` hears what it shows, while somebody looks.
 
 | topic | type | said by | heard by | quality of service (said / heard) | what it is |
 |---|---|---|---|---|---|
@@ -60,11 +75,11 @@ value is refused with the reason and changes nothing; *fixed* parameters are rea
 
 def write_reference(folder: Path) -> list[Path]:
     """Write the pages, and the SROS2 policy, into a folder; their paths."""
-    with every_node() as nodes:
+    with every_node((*NODES, *COMPANIONS)) as nodes:
         pages = {
             'topics.md': topics_page(nodes),
             'parameters.md': parameters_page(nodes),
-            'sros2_policy.xml': policy_xml(nodes),
+            'sros2_policy.xml': policy_xml(nodes[: len(NODES)]),
         }
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in pages.items():
@@ -73,24 +88,40 @@ def write_reference(folder: Path) -> list[Path]:
 
 
 @contextmanager
-def every_node() -> Iterator[list[GraphNode]]:
-    """One of each node, in a private context, until the block ends."""
+def every_node(
+    specs: Sequence[NodeSpec] = NODES, arguments: Sequence[str] = ()
+) -> Iterator[list[GraphNode]]:
+    """One of each node, with further ROS arguments, in a private context, until the block ends."""
     context = Context()
     rclpy.init(args=[], context=context)
-    with TemporaryDirectory() as pictures:
-        # The camera wants something to show.
-        cv2.imwrite(f'{pictures}/grey.png', np.full((48, 64, 3), 128, np.uint8))
-        overrides = {'camera': [Parameter('source', value=pictures)]}
+    cli_args = ['--ros-args', *arguments] if arguments else []
+    with TemporaryDirectory() as folder:
+        overrides = _stand_ins(Path(folder))
         nodes: list[GraphNode] = []
         try:
-            for spec in NODES:
+            for spec in specs:
+                make = spec.load()
                 own = overrides.get(spec.thing, [])
-                nodes.append(spec.load()(context=context, parameter_overrides=own))
+                nodes.append(make(context=context, parameter_overrides=own, cli_args=cli_args))
             yield nodes
         finally:
             for node in nodes:
                 node.destroy_node()
             context.try_shutdown()
+
+
+def _stand_ins(folder: Path) -> dict[str, list[Parameter]]:
+    """Something to show for the camera, something to play, and a place to record into."""
+    cv2.imwrite(str(folder / 'grey.png'), np.full((48, 64, 3), 128, np.uint8))
+    recording = RecordingFolder(folder / 'played', Limits())
+    clock = Channel(CLOCK.name, 'rosgraph_msgs/msg/Clock', offered_text([CLOCK.says]))
+    recording.write(clock, serialize_message(Clock()), 0, 0, 0)
+    recording.close()
+    return {
+        'camera': [Parameter('source', value=str(folder))],
+        'player': [Parameter('recording', value=str(folder / 'played'))],
+        'recorder': [Parameter('folder', value=str(folder / 'recorded'))],
+    }
 
 
 def topics_page(nodes: list[GraphNode]) -> str:
@@ -151,8 +182,10 @@ def _qos(profile: QoSProfile) -> str:
 
 
 def _default(node: GraphNode, name: str) -> str:
-    if any(p.name == name for p in node._parameter_overrides.values()):
+    if name in _MUST_BE_GIVEN:
         return '(must be given)'
+    if name == 'folder':
+        return repr(RecorderConfig.folder)  # not where it records just now
     value = node.get_parameter(name).value
     return repr(round(value, 6)) if isinstance(value, float) else repr(value)
 
