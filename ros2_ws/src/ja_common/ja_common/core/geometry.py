@@ -50,9 +50,11 @@ def rays_of_directions(posture: ArrayLike, directions: ArrayLike) -> NDArray[np.
 
 
 def angle_between(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
-    """Angle [rad] between directions of shape (..., 2), along the great circle."""
-    u, v = vectors_of_directions(a), vectors_of_directions(b)
-    return np.arctan2(np.linalg.norm(np.cross(u, v), axis=-1), np.einsum('...i,...i->...', u, v))
+    """Angle [rad] between directions of shape (..., 2), along the great circle (haversine)."""
+    a, b = np.asarray(a, float), np.asarray(b, float)
+    squares = np.sin((a - b) / 2) ** 2
+    share = squares[..., 1] + np.cos(a[..., 1]) * np.cos(b[..., 1]) * squares[..., 0]
+    return 2 * np.arcsin(np.sqrt(np.minimum(share, 1.0)))
 
 
 def _as_last_axis(*components: ArrayLike) -> NDArray[np.float64]:

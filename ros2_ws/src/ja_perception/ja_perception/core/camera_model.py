@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import cv2
 import numpy as np
@@ -57,18 +57,14 @@ class CameraModel:
         """K, shape (3, 3)."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1.0]])
 
+    @cached_property
+    def inverse_matrix(self) -> NDArray[np.float64]:
+        """K^-1, shape (3, 3)."""
+        return np.linalg.inv(self.matrix).astype(np.float64)
+
     def resized(self, width: int, height: int) -> 'CameraModel':
         """The same camera delivering images of another size."""
-        sx, sy = width / self.width, height / self.height
-        return replace(
-            self,
-            width=width,
-            height=height,
-            fx=self.fx * sx,
-            fy=self.fy * sy,
-            cx=(self.cx + 0.5) * sx - 0.5,
-            cy=(self.cy + 0.5) * sy - 0.5,
-        )
+        return _resized(self, width, height)
 
     def rays(self, pixels: ArrayLike) -> NDArray[np.float64]:
         """Rays (x, y) with z = 1, shape (..., 2), of pixels (u, v), lens distortion removed."""
@@ -97,3 +93,18 @@ class CameraModel:
         """Does the pixel (u, v) lie in the image? False for NaN (behind the camera)."""
         u, v = np.asarray(pixel, float)
         return bool(-0.5 <= u < self.width - 0.5 and -0.5 <= v < self.height - 0.5)
+
+
+@lru_cache(maxsize=16)
+def _resized(camera: CameraModel, width: int, height: int) -> CameraModel:
+    # Kept, for it is asked for with every image, and its matrices are kept with it.
+    sx, sy = width / camera.width, height / camera.height
+    return replace(
+        camera,
+        width=width,
+        height=height,
+        fx=camera.fx * sx,
+        fy=camera.fy * sy,
+        cx=(camera.cx + 0.5) * sx - 0.5,
+        cy=(camera.cy + 0.5) * sy - 0.5,
+    )

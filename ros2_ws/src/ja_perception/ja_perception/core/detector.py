@@ -19,7 +19,7 @@ from ja_perception.core.features import FeatureConfig
 from ja_perception.core.grouping import GroupingConfig
 from ja_perception.core.motion import MotionConfig
 from ja_perception.core.object_tracking import TrackingConfig
-from ja_perception.core.salient_objects import InterestConfig, SalientObject, SalientObjects
+from ja_perception.core.salient_objects import InterestConfig, SalientObjects
 
 
 @dataclass(frozen=True)
@@ -111,20 +111,24 @@ class SalientFeatureDetector:
         position = np.zeros(2) if posture is None else posture.position
         grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
         faces = self._faces.look(image, grey, camera, position, stamp_ns)
+        rays = [face.ray(position) for face in faces]
         boxes = [face.box(camera, position) for face in faces]
         objects = self._objects.find(
             image, stamp_ns, camera, posture, [_whole_head(box) for box in boxes]
         )
-        attended = bool(faces) and self._attends(faces[0].ray(position), posture)
+        attended = bool(faces) and self._attends(rays[0], posture)
         crop_box = self._crop_box(boxes[0]) if attended else None
         face_image = None if crop_box is None else crop_face(grey, crop_box)
-        face_rows = [
-            _row(Kind.FACE, box, camera, face.score, face.track_id, attended and index == 0)
-            for index, (face, box) in enumerate(zip(faces, boxes, strict=True))
-        ]
-        object_rows = [_object_row(item, camera) for item in objects]
+        face_rows: list[Detection] = []
+        for face, box, ray in zip(faces, boxes, rays, strict=True):
+            x, y = ray.tolist()
+            picture_follows = attended and not face_rows
+            row = Detection(
+                Kind.FACE, x, y, *box, face.score, face.track_id, attended=picture_follows
+            )
+            face_rows.append(row)
         return Percept(
-            face_rows + object_rows,
+            face_rows + objects,
             face_image,
             crop_box,
             self._objects.motion_judged,
@@ -145,24 +149,3 @@ class SalientFeatureDetector:
 def _whole_head(face: Box) -> Box:
     """The head with hair, ears and neck around the box of a face."""
     return Box(face.u, face.v, 1.5 * face.width, 1.8 * face.height)
-
-
-def _row(
-    kind: Kind,
-    box: Box,
-    camera: CameraModel,
-    score: float,
-    track_id: int,
-    attended: bool = False,
-    features: tuple[float, float, float] = (0.0, 0.0, 0.0),
-) -> Detection:
-    x, y = camera.rays((box.u, box.v))
-    return Detection(
-        kind, float(x), float(y), box.u, box.v, box.width, box.height, score, track_id, *features,
-        attended=attended,
-    )  # fmt: skip
-
-
-def _object_row(item: SalientObject, camera: CameraModel) -> Detection:
-    features = (item.f_col, item.f_edg, item.f_mot)
-    return _row(Kind.OBJECT, item.box, camera, item.score, item.track_id, features=features)

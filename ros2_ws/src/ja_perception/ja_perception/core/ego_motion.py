@@ -21,7 +21,7 @@ def rotation_homography(
     """
     now_from_before = head_rotation(posture_now).T @ head_rotation(posture_before)
     in_optical = _OPTICAL_FROM_HEAD @ now_from_before @ _OPTICAL_FROM_HEAD.T
-    return camera.matrix @ in_optical @ np.linalg.inv(camera.matrix)
+    return camera.matrix @ in_optical @ camera.inverse_matrix
 
 
 def expected_image(
@@ -29,21 +29,15 @@ def expected_image(
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     """The (H, W) image before as expected now, and a mask (H, W): 1 where it was in view."""
     height, width = before.shape
-    size = (width, height)
-    # Repeated borders: a blur near them must not mix in what never was there.
-    warped = cv2.warpPerspective(before, homography, size, borderMode=cv2.BORDER_REPLICATE)
-    seen = np.zeros_like(before)
-    corners = np.array(
-        [[[-0.5, -0.5], [width - 0.5, -0.5], [width - 0.5, height - 0.5], [-0.5, height - 0.5]]]
-    )
-    outline = cv2.perspectiveTransform(corners, homography)
-    if _in_front(corners, homography):
-        # Fixed-point corners (4 bits), shrunk by the pixel that interpolation cannot fill.
-        cv2.fillConvexPoly(seen, np.round(outline * 16).astype(np.int32), 1, shift=4)
-        seen = cv2.erode(seen, np.ones((3, 3), np.uint8))
-    return warped, seen
+    if not _in_front(width, height, homography):
+        return np.zeros_like(before), np.zeros_like(before)
+    # Black, which the image itself is nowhere, comes in from beyond its borders.
+    lit = cv2.max(before, 1)
+    warped = cv2.warpPerspective(lit, homography, (width, height), flags=cv2.INTER_NEAREST)
+    return warped, cv2.min(warped, 1)
 
 
-def _in_front(corners: NDArray[np.float64], homography: NDArray[np.float64]) -> bool:
+def _in_front(width: int, height: int, homography: NDArray[np.float64]) -> bool:
     """Does the whole image before lie in front of the camera now?"""
-    return bool(np.all(corners.reshape(-1, 2) @ homography[2, :2] + homography[2, 2] > 1e-6))
+    across, down, depth = homography[2].tolist()
+    return depth + min(0.0, across * width) + min(0.0, down * height) > 1e-6

@@ -14,6 +14,9 @@ from ja_common.core.config import parameter
 
 Mask = NDArray[np.uint8]
 
+_NEIGHBOURS = np.ones((3, 3), np.uint8)
+_SPECK = np.ones((2, 2), np.uint8)
+
 
 @dataclass(frozen=True)
 class FeatureConfig:
@@ -53,13 +56,10 @@ def colour_map(rgb: NDArray[np.uint8], config: FeatureConfig) -> ColourMap:
 
 def edge_map(grey: Mask, config: FeatureConfig) -> Mask:
     """Pixels at which the brightness of an (H, W) image steps."""
-    threshold = 255 * config.edge_contrast
-    across = cv2.absdiff(grey[:, 1:], grey[:, :-1])
-    down = cv2.absdiff(grey[1:], grey[:-1])
-    edges = np.zeros_like(grey)
-    edges[:, 1:] = across > threshold
-    edges[1:] |= down > threshold
-    return edges
+    steps = np.zeros_like(grey)
+    cv2.absdiff(grey[:, 1:], grey[:, :-1], dst=steps[:, 1:])
+    cv2.max(steps[1:], cv2.absdiff(grey[1:], grey[:-1]), dst=steps[1:])
+    return _above(steps, 255 * config.edge_contrast)
 
 
 def motion_map(grey: Mask, expected: Mask, seen_before: Mask, config: FeatureConfig) -> Mask:
@@ -69,21 +69,20 @@ def motion_map(grey: Mask, expected: Mask, seen_before: Mask, config: FeatureCon
     one pixel in the compensation of the head's motion is no motion. Where ``seen_before`` is 0
     nothing is expected, and nothing moves. A change of light over the whole view is no motion.
     """
-    if not seen_before.any():
-        return np.zeros_like(grey)
-    # Detail as fine as the pixels looks different after every shift by part of a pixel.
-    grey, expected = cv2.blur(grey, (3, 3)), cv2.blur(expected, (3, 3))
     lighter = cv2.mean(grey, seen_before)[0] - cv2.mean(expected, seen_before)[0]
-    tolerance = 255 * config.motion_contrast
-    kernel = np.ones((3, 3), np.uint8)
-    highest = cv2.add(cv2.dilate(expected, kernel), lighter + tolerance)
-    lowest = cv2.add(cv2.erode(expected, kernel), lighter - tolerance)
-    moving = (grey > highest) | (grey < lowest)
-    return without_specks(moving.view(np.uint8)) & seen_before
+    in_same_light = cv2.subtract(grey, lighter)
+    too_light = cv2.subtract(in_same_light, cv2.dilate(expected, _NEIGHBOURS))
+    too_dark = cv2.subtract(cv2.erode(expected, _NEIGHBOURS), in_same_light)
+    moving = _above(cv2.max(too_light, too_dark), 255 * config.motion_contrast)
+    return without_specks(moving) & seen_before
 
 
 def without_specks(mask: Mask) -> Mask:
     """The mask without what is thinner than two pixels: noise."""
-    kernel = np.ones((2, 2), np.uint8)
     # Opposite anchors: with its default ones an even kernel shifts the mask by a pixel.
-    return cv2.dilate(cv2.erode(mask, kernel, anchor=(0, 0)), kernel, anchor=(1, 1))
+    return cv2.dilate(cv2.erode(mask, _SPECK, anchor=(0, 0)), _SPECK, anchor=(1, 1))
+
+
+def _above(values: Mask, threshold: float) -> Mask:
+    """1 where a value is above the threshold, else 0."""
+    return cv2.threshold(values, threshold, 1, cv2.THRESH_BINARY)[1]

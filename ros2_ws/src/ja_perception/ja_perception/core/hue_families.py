@@ -1,45 +1,55 @@
 """Hues that belong together, by the valleys of their histogram on the hue circle."""
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 HUES = 180
 """OpenCV's hues, in steps of two degrees."""
-_BLUR = 4
 # Hues within such an arc need no closer look.
 _ONE_HUE = 20
 # A hue is a peak of its own when it is this large beside the largest peak, and when the valleys
 # beside it are lower than this share of it.
 _LEAST_PEAK, _VALLEY = 0.1, 0.4
+_BLUR = 4
 
 
-def hue_families(histogram: NDArray[np.float32]) -> NDArray[np.intp] | None:
-    """Family number of each of the 180 hues, shape (180,); None when all are of one family."""
+def _blurring() -> NDArray[np.float32]:
+    """Blurs a histogram round the circle of hues: (182, 180), for the ends meet in the result."""
+    apart = (np.arange(HUES) - np.arange(-1, HUES + 1)[:, None]) % HUES
+    weights = np.exp(-0.5 * (np.minimum(apart, HUES - apart) / _BLUR) ** 2)
+    return (weights / weights[0].sum()).astype(np.float32)
+
+
+_BLURRING = _blurring()
+
+
+def hue_families(histogram: NDArray[np.float32]) -> NDArray[np.uint8] | None:
+    """Family number of each hue, as a table for ``cv2.LUT``; None when all are of one family.
+
+    ``histogram`` has the number of pixels of each hue, shape (180,). Shape (256,): what lies
+    beyond the hues has no meaning.
+    """
     used = np.flatnonzero(histogram)
-    unused = np.diff(used, append=used[:1] + HUES)
-    if HUES - unused.max(initial=0) < _ONE_HUE:
+    if not used.size:
         return None
-    ring = np.tile(histogram, 3)[None]
-    smooth = cv2.GaussianBlur(ring, (0, 0), _BLUR)[0, HUES : 2 * HUES]
-    is_peak = (smooth > np.roll(smooth, 1)) & (smooth >= np.roll(smooth, -1))
+    widest_gap = max(used[0] + HUES - used[-1], (used[1:] - used[:-1]).max(initial=0))
+    if HUES - widest_gap < _ONE_HUE:
+        return None
+    ring = _BLURRING @ histogram
+    smooth = ring[1:-1]
+    is_peak = (smooth > ring[:-2]) & (smooth >= ring[2:])
     peaks = np.flatnonzero(is_peak & (smooth > _LEAST_PEAK * smooth.max())).tolist()
+    twice_round = np.concatenate([smooth, smooth])
     while len(peaks) > 1:
-        nexts = peaks[1:] + peaks[:1]
-        cuts = [_lowest_between(smooth, *pair) for pair in zip(peaks, nexts, strict=True)]
+        ends = [*peaks[1:], peaks[0] + HUES]
+        cuts = [a + int(twice_round[a:b].argmin()) for a, b in zip(peaks, ends, strict=True)]
+        valleys = twice_round[cuts]
         # Each peak against the higher of its two valleys: the shallowest one falls first.
-        depths = [
-            max(smooth[cuts[i - 1]], smooth[cuts[i]]) / smooth[peak]
-            for i, peak in enumerate(peaks)
-        ]
-        shallowest = int(np.argmax(depths))
+        depths = np.maximum(valleys, np.roll(valleys, 1)) / smooth[peaks]
+        shallowest = int(depths.argmax())
         if depths[shallowest] <= _VALLEY:
-            return np.searchsorted(np.sort(cuts), np.arange(HUES), side='right') % len(peaks)
+            borders = np.sort(np.array(cuts) % HUES)
+            family = np.searchsorted(borders, np.arange(256), side='right') % len(peaks)
+            return family.astype(np.uint8)
         del peaks[shallowest]
     return None
-
-
-def _lowest_between(smooth: NDArray[np.float32], start: int, end: int) -> int:
-    """The hue of the lowest value on the way from ``start`` up the circle to ``end``."""
-    way = (start + np.arange((end - start) % HUES or HUES)) % HUES
-    return int(way[np.argmin(smooth[way])])

@@ -36,7 +36,7 @@ class MotionConfig:
 
 @dataclass(frozen=True)
 class _Past:
-    """An earlier image (grey, small, without lens distortion) and the head's position then."""
+    """An earlier image (small, smooth, without lens distortion) and the head's position then."""
 
     grey: Mask
     position: NDArray[np.float64]
@@ -68,7 +68,9 @@ class MotionDetector:
             grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
         camera = camera.resized(grey.shape[1], grey.shape[0])
         position = np.zeros(2) if posture is None else posture.position
-        present = _Past(straightened(grey, camera), position, stamp_ns)
+        # Detail as fine as the pixels looks different after every shift by part of a pixel.
+        smooth = cv2.blur(straightened(grey, camera), (3, 3))
+        present = _Past(smooth, position, stamp_ns)
         if posture is not None and not posture.is_still(self._config.motion_below_rad_s):
             self._past.clear()
             return None
@@ -76,7 +78,10 @@ class MotionDetector:
         self._past.append(present)
         if references is None:
             return None
-        moving = cv2.bitwise_and(*[self._since(past, present, camera) for past in references])
+        oldest, middle = references
+        moving = self._since(oldest, present, camera)
+        if cv2.countNonZero(moving):
+            moving &= self._since(middle, present, camera)
         return cv2.resize(bent(moving, camera), (width, height), interpolation=cv2.INTER_NEAREST)
 
     def _references(self, present: _Past, camera: CameraModel) -> tuple[_Past, _Past] | None:

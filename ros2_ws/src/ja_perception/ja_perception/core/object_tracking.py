@@ -80,11 +80,12 @@ class ObjectTracker:
             return []
         known = np.array([track.direction for track in self._tracks])
         angles = angle_between(directions[:, None], known[None])
-        pairs: list[tuple[int, int]] = []
-        for _ in range(min(angles.shape)):
-            row, column = np.unravel_index(int(np.argmin(angles)), angles.shape)
-            if angles[row, column] > self._config.same_object_within_rad:
-                break
-            pairs.append((int(row), int(column)))
-            angles[row], angles[:, column] = np.inf, np.inf
-        return pairs
+        near = np.argwhere(angles <= self._config.same_object_within_rad)
+        order = np.argsort(angles[tuple(near.T)], kind='stable')
+        pairs: dict[int, int] = {}
+        taken: set[int] = set()
+        for row, column in near[order].tolist():
+            if row not in pairs and column not in taken:
+                pairs[row] = column
+                taken.add(column)
+        return list(pairs.items())

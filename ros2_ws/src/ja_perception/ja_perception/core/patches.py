@@ -1,29 +1,35 @@
 """Connected patches of a mask."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import cv2
+import numpy as np
+from numpy.typing import NDArray
 
 from ja_perception.core.box import Box
 from ja_perception.core.features import Mask
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Patch:
-    """A connected patch: its upper left pixel, its own mask (h, w) of 0 and 1, and its area."""
+    """A connected patch: its upper left pixel, its size and area [px], and which pixels it has.
+
+    Those are the pixels of ``labels`` (height, width) that carry its ``label``.
+    """
 
     x: int
     y: int
-    mask: Mask
+    width: int
+    height: int
     area: int
+    label: int
+    labels: NDArray[np.uint16]
 
-    @property
-    def width(self) -> int:
-        return self.mask.shape[1]
-
-    @property
-    def height(self) -> int:
-        return self.mask.shape[0]
+    @cached_property
+    def mask(self) -> Mask:
+        """Its own pixels, (height, width) of 0 and 1."""
+        return (self.labels == self.label).view(np.uint8)
 
     @property
     def box(self) -> Box:
@@ -46,14 +52,22 @@ def _ends_thick(mask: Mask, area: int) -> bool:
     return min(mask[:, 0].sum(), mask[:, -1].sum()) > thickness / 2
 
 
-def patches_of(mask: Mask, smallest: int) -> list[Patch]:
-    """The connected patches of a mask (H, W) that have at least ``smallest`` pixels."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
+def patches_of(mask: Mask, smallest: int, neighbours: int = 4) -> list[Patch]:
+    """The connected patches of a mask (H, W) that have at least ``smallest`` pixels.
+
+    With 8 ``neighbours`` instead of 4, pixels that touch at a corner are connected.
+    """
+    left, top, columns, rows = cv2.boundingRect(mask)
+    if not columns:
+        return []
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(
+        mask[top : top + rows, left : left + columns], connectivity=neighbours, ltype=cv2.CV_16U
+    )
     patches = []
     for label, (x, y, width, height, area) in enumerate(stats.tolist()):
         if label and area >= smallest:
-            own = cv2.compare(labels[y : y + height, x : x + width], label, cv2.CMP_EQ)
-            patches.append(Patch(x, y, cv2.min(own, 1), area))
+            own = labels[y : y + height, x : x + width]
+            patches.append(Patch(left + x, top + y, width, height, area, label, own))
     return patches
 
 
