@@ -1,5 +1,6 @@
 """`learning_module`: proposes where to look from the caregiver's face, and learns it online."""
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -71,7 +72,7 @@ class LearningModuleNode(GraphNode):
         self._gaze_line_config = self.configure(GazeLineConfig)
         self._joints = JointCodec(self.configure(JointConfig))
         self._learning = self._config.learning_enabled_at_start
-        torch.set_num_threads(1)  # on networks this small, threads wait for each other
+        _share_the_interpreter()
         self._learner = KeptLearner(self, self.untaught, self._config.lockstep)
         self._module = LearningModule(
             lambda: self._learner.predictor,
@@ -141,6 +142,8 @@ class LearningModuleNode(GraphNode):
         self, header: Header, rays: np.ndarray, face: np.ndarray | None, posture: Posture
     ) -> None:
         proposal = self._module.see(posture, rays, face)
+        if proposal.given_up is not None and self._learning:
+            self._learner.learn(proposal.given_up)
         self._delta.publish(self._joints.encode(header, proposal.delta))
         self._glance_delta.publish(self._joints.encode(header, proposal.glance))
         evidence = {'log_evidence': [proposal.log_evidence]}
@@ -188,6 +191,15 @@ class LearningModuleNode(GraphNode):
         """What was lived is learned and saved before the end."""
         self._learner.close()
         super().destroy_node()
+
+
+def _share_the_interpreter() -> None:
+    """Let the thread that proposes and the one that learns hinder each other little."""
+    # In networks this small, threads of one kernel wait for each other longer than they compute.
+    torch.set_num_threads(1)
+    # So long does the one wait before it asks the other for the interpreter; Python's 5 ms is all
+    # the time that a proposal has (`./ja bench inference`).
+    sys.setswitchinterval(2e-4)
 
 
 def main(args: list[str] | None = None) -> None:

@@ -1,0 +1,167 @@
+"""Does learning make proposals late? Image in to delta out of a learner at work, over real topics.
+
+The learning module runs in a process of its own at 30 images/s; this process plays the camera, the
+detector and the evaluator, and holds the watch: from the detections' publication to the delta's
+arrival, both journeys included. A trial of a random face lasts for five images, and each is learned;
+checkpoints are written as on a rig.
+"""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from numpy.typing import NDArray
+from rclpy.context import Context
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from ja_bringup.bench import Row
+from ja_bringup.benchmarks._rows import percentile_99, row
+from ja_bringup.graph import NodeSpec
+from ja_bringup.supervisor import Supervisor
+from ja_common.core.config import ConfigError
+from ja_common.core.detection import Detection, Kind
+from ja_common.core.stamps import NS_PER_S
+from ja_common.detection_codec import encode_detections
+from ja_common.executor import KeptWaitSetExecutor
+from ja_common.graph_node import GraphNode
+from ja_common.image_codec import encode_image
+from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.ros_defaults import apply_ros_defaults
+from ja_common.time_codec import to_ns, to_time
+from ja_common.topics import DETECTIONS, DIAGNOSTICS, FACE_IMAGE, FIXATION, JOINT_STATES, LM_DELTA
+
+RATE_HZ = 30.0
+WARM_UP_IMAGES, IMAGES = 60, 600
+IMAGES_A_TRIAL = 5
+OBJECTS = 5
+PATIENCE_S = 5.0
+# So many that a lesson lasts longer than a trial.
+MANY_STEPS = 12
+CONDITIONS: dict[str, dict[str, Any]] = {
+    'not learning': {'learning_enabled_at_start': False},
+    'learning': {},
+    'always learning': {'replay_steps': MANY_STEPS},
+}
+
+
+def run() -> dict[str, Row]:
+    """The fast learner, while it does not learn, as configured by default, and at work always."""
+    apply_ros_defaults()
+    rows: dict[str, Row] = {}
+    for name, parameters in CONDITIONS.items():
+        watch = _measure(parameters)
+        delays_ms = np.array(watch.delays_ms[WARM_UP_IMAGES:])
+        rows |= {
+            f'delay, median, {name}': row(delays_ms, 'ms', np.median),
+            f'delay, 99th percentile, {name}': row(delays_ms, 'ms', percentile_99),
+            f'delay, longest, {name}': _figure(delays_ms.max(), 'ms', len(delays_ms)),
+            f'trials handed over, {name}': _figure(watch.trials, 'trials', 1),
+            f'of these not yet learned in the end, {name}': _figure(watch.waiting, 'trials', 1),
+        }
+    return rows
+
+
+def _measure(parameters: dict[str, Any]) -> '_Watch':
+    context = Context()
+    rclpy.init(args=[], context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
+    watch = _Watch(context=context)
+    executor = KeptWaitSetExecutor(context=context)
+    executor.add_node(watch)
+    story = watch.story()
+
+    def tick() -> bool:
+        executor.spin_once(timeout_sec=0.005)
+        return next(story, 'over') == 'over'
+
+    try:
+        with TemporaryDirectory() as folder:
+            kept = {'learner': 'gaze_line', 'checkpoint_folder': f'{folder}/checkpoints'}
+            learner = NodeSpec('ja_learning', 'learning_module', {**kept, **parameters})
+            if Supervisor([learner], Path(folder) / 'log').run(tick):
+                raise ConfigError('the learning module did not run to the end of the measurement')
+    finally:
+        executor.shutdown()
+        watch.destroy_node()
+        context.try_shutdown()
+    return watch
+
+
+class _Watch(GraphNode):
+    """Plays all that the learner hears, image after image, and times its answers."""
+
+    def __init__(self, **node_kwargs: Any) -> None:
+        super().__init__('watch', **node_kwargs)
+        self._random = np.random.default_rng(0)
+        self._joints = JointCodec(JointConfig())
+        said = (JOINT_STATES, FACE_IMAGE, DETECTIONS, FIXATION)
+        self._say = {topic: self.say(topic) for topic in said}
+        self._answered: tuple[int, float] = (0, 0.0)
+        self.delays_ms: list[float] = []
+        self.trials = self.waiting = 0
+        self.hear(LM_DELTA, self._on_delta)
+        self.hear(DIAGNOSTICS, self._on_diagnostics)
+
+    def story(self) -> Iterator[str]:
+        """The measurement in steps; the caller spins between them."""
+        while not all(each.get_subscription_count() for each in self._say.values()):
+            yield 'waiting for the learner'
+        due_s = time.monotonic()
+        for number in range(WARM_UP_IMAGES + IMAGES):
+            while time.monotonic() < due_s:
+                yield 'waiting for the time of the next image'
+            stamp_ns = int((number + 1) / RATE_HZ * NS_PER_S)
+            began_s = self._show(number, Header(stamp=to_time(stamp_ns)))
+            late_s = time.monotonic() + PATIENCE_S
+            while self._answered[0] != stamp_ns:
+                if time.monotonic() > late_s:
+                    raise ConfigError(f'no answer of the learner within {PATIENCE_S:g} s')
+                yield 'waiting for the answer'
+            self.delays_ms.append(1e3 * (self._answered[1] - began_s))
+            self._judge(number, Header(stamp=to_time(stamp_ns)))
+            due_s = max(due_s + 1.0 / RATE_HZ, time.monotonic())
+
+    def _show(self, number: int, header: Header) -> float:
+        """An image of the trial: the first is a look, then the head has shifted. When said [s]."""
+        looks = number % IMAGES_A_TRIAL == 0
+        posture = np.zeros(2) if looks else np.array([0.2, 0.0])
+        self._say[JOINT_STATES].publish(self._joints.encode_posture(header, posture, np.zeros(2)))
+        seen = [_detection(Kind.OBJECT, ray) for ray in self._rays()]
+        if looks:
+            face = self._random.integers(0, 256, (30, 25)).astype(np.uint8)
+            self._say[FACE_IMAGE].publish(encode_image(face, header.stamp, ''))
+            seen.append(_detection(Kind.FACE, np.zeros(2)))
+        detections = encode_detections(header, seen)
+        began_s = time.perf_counter()
+        self._say[DETECTIONS].publish(detections)
+        return began_s
+
+    def _judge(self, number: int, header: Header) -> None:
+        ends = number % IMAGES_A_TRIAL == IMAGES_A_TRIAL - 1
+        direction = np.array([0.2, 0.0]) if ends else None
+        self._say[FIXATION].publish(self._joints.encode(header, direction))
+
+    def _rays(self) -> NDArray[np.float64]:
+        return self._random.uniform(-0.3, 0.3, (OBJECTS, 2))
+
+    def _on_delta(self, message: JointState) -> None:
+        self._answered = to_ns(message.header.stamp), time.perf_counter()
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        values = {pair.key: pair.value for status in message.status for pair in status.values}
+        self.trials = int(values.get('trials learned', self.trials))
+        self.waiting = int(values.get('of these still waiting', self.waiting))
+
+
+def _detection(kind: Kind, ray: NDArray[np.float64]) -> Detection:
+    x, y = map(float, ray)
+    return Detection(kind, x, y, 0.0, 0.0, 9.0, 9.0, 1.0, attended=kind is Kind.FACE)
+
+
+def _figure(value: float, unit: str, n: int) -> Row:
+    return {'value': float(value), 'unit': unit, 'n': n, 'interval': None}
