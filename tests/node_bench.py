@@ -46,8 +46,13 @@ class NodeBench:
             self.peer.create_subscription(topic.type, topic.name, keep, topic.hears)
         ours = {f'/{topic.name}'.replace('//', '/') for topic in hears}
         answering = [p for p in self.node.publishers if p.topic_name in ours]
-        matched = [*self._publishers.values(), *answering]
-        self.wait(lambda: all(p.get_subscription_count() for p in matched))
+        speakers = [*self._publishers.values(), *answering]
+        self.wait(lambda: all(p.get_subscription_count() for p in speakers))
+        # Both sides must know: a best-effort listener drops what comes from a stranger.
+        spoken = {p.topic_name for p in speakers}
+        both = [*self.node.subscriptions, *self.peer.subscriptions]
+        listeners = [s for s in both if s.topic_name in spoken]
+        self.wait(lambda: all(s.get_publisher_count() for s in listeners))
 
     def close(self) -> None:
         """Destroy both nodes."""

@@ -30,7 +30,7 @@ from ja_common.core.health import Level
 from ja_common.graph_node import GraphNode, spin_node
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.parameters import choices_of
-from ja_common.topics import DIAGNOSTICS, FIXATION, GATE_STATUS, LOG
+from ja_common.topics import DIAGNOSTICS, FIXATION, GATE_STATUS, LOG, Topic
 
 LOOK_EVERY_S = 0.1
 _ASK_EVERY_S = 2.0
@@ -112,11 +112,15 @@ class ViewNode(GraphNode):
 
     def destroy_node(self) -> None:
         """Let go of the mailboxes, which the node does not know, then of the node."""
-        self._fixations.close()
-        self._statuses.close()
-        if self._sight is not None:
-            self._sight.close()
+        for mailbox in self.mailboxes.values():
+            mailbox.close()
         super().destroy_node()
+
+    @property
+    def mailboxes(self) -> dict[Topic, Mailbox]:
+        """What is heard at the moment without waking the executor."""
+        always = {FIXATION: self._fixations, GATE_STATUS: self._statuses}
+        return always | (self._sight.boxes if self._sight is not None else {})
 
     def watched(self) -> None:
         """Somebody looks at the page; to be said again and again while it is true."""

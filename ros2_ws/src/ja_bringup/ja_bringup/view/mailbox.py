@@ -32,6 +32,12 @@ class Mailbox:
                 node.handle, topic.type, topic.name, quiet.get_c_qos_profile()
             )
 
+    @property
+    def publishers(self) -> int:
+        """How many publishers it hears; a best-effort message from any other is lost."""
+        with self._handle:
+            return self._handle.get_publisher_count()
+
     def take(self) -> list[tuple[Any, int]]:
         """What has come since the last call, oldest first, each with the time [ns] of sending."""
         taken = []

@@ -79,7 +79,7 @@ class Sight:
         self._node = node
         self._model = model
         self._joints = joints
-        self._boxes = {topic: Mailbox(node, topic, depth) for topic, depth in _DEPTHS.items()}
+        self.boxes = {topic: Mailbox(node, topic, depth) for topic, depth in _DEPTHS.items()}
         self._postures = PostureHistory()
         self._pending: tuple[int, Any] | None = None
         self._sent_ns: dict[int, int] = {}
@@ -91,23 +91,23 @@ class Sight:
 
     def close(self) -> None:
         """Stop listening."""
-        for box in self._boxes.values():
+        for box in self.boxes.values():
             box.close()
-        self._boxes.clear()
+        self.boxes.clear()
 
     def show_truth(self, shown: bool) -> None:
         """Hear the truth of the simulation, or not: unasked, none but the scorer hears it."""
-        if shown and SIM_TRUTH not in self._boxes:
-            self._boxes[SIM_TRUTH] = Mailbox(self._node, SIM_TRUTH, 1)
-        elif not shown and SIM_TRUTH in self._boxes:
-            self._boxes.pop(SIM_TRUTH).close()
+        if shown and SIM_TRUTH not in self.boxes:
+            self.boxes[SIM_TRUTH] = Mailbox(self._node, SIM_TRUTH, 1)
+        elif not shown and SIM_TRUTH in self.boxes:
+            self.boxes.pop(SIM_TRUTH).close()
 
     def look(self, now_s: float, fixations: list[tuple[JointState, int]]) -> None:
         """Take what has come, and the fixations that were heard anyhow.
 
         An image is shown once the detections on it are here.
         """
-        taken = {topic: box.take() for topic, box in self._boxes.items()} | {FIXATION: fixations}
+        taken = {topic: box.take() for topic, box in self.boxes.items()} | {FIXATION: fixations}
         for message, _ in taken[CAMERA_INFO]:
             self._calibration = message
         for message, _ in taken[JOINT_STATES]:
@@ -190,7 +190,7 @@ class Sight:
                 np.column_stack([c['pan'], c['tilt']]).astype(float),
                 int(attended[0]) if len(attended) else -1,
             )
-        return self.glance.truth if self.glance and SIM_TRUTH in self._boxes else None
+        return self.glance.truth if self.glance and SIM_TRUTH in self.boxes else None
 
     def _camera(self, image: NDArray[np.uint8]) -> CameraModel:
         height, width = image.shape[:2]
