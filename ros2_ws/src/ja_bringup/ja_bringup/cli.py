@@ -19,6 +19,7 @@ from ja_bringup.graph import (
 )
 from ja_bringup.inspect_cli import register as register_inspection
 from ja_bringup.recording.cli import register as register_recording
+from ja_bringup.rig_cli import register as register_rig_tools
 from ja_common.core.config import ConfigError
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_experiments.cli import register as register_experiments
@@ -183,6 +184,7 @@ def reference(
 register_experiments(app)
 register_recording(app)
 register_inspection(app)
+register_rig_tools(app)
 show_examples(app)
 
 

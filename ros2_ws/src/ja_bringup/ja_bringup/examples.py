@@ -50,6 +50,10 @@ EXAMPLES: dict[str, dict[str, str]] = {
             'of ./ja demo --record, whose robot glances aside'
         ),
     },
+    'faults': {
+        './ja faults': 'every fault, once; a table after four minutes',
+        './ja faults --only network': 'those with this in their name',
+    },
     'doctor': {
         './ja doctor': 'what is wrong, and how to mend it',
         "./ja doctor --json | jq '.[] | select(.well | not)'": 'only what is wrong',

@@ -12,6 +12,7 @@ from types import FrameType
 from typing import Literal
 
 from ja_bringup.child import PARENT
+from ja_bringup.dead_segments import remove_dead_segments
 from ja_bringup.graph import NodeSpec
 
 OnDeath = Literal['stop', 'restart']
@@ -163,6 +164,7 @@ class Supervisor:
 
     def _start(self) -> None:
         self._log_folder.mkdir(parents=True, exist_ok=True)
+        remove_dead_segments()
         for spec in self._graph:
             self._processes.append(NodeProcess(spec, self._log_folder / f'{spec.thing}.log'))
 
@@ -182,6 +184,7 @@ class Supervisor:
                 self._report(f'{death}\nit has died {_SHORT_LIVES} times at once; stopping')
                 return False
             self._report(f'{death}\nstarting it again')
+            remove_dead_segments()  # or a node that dies again and again fills the memory
             process.start()
         return True
 

@@ -1,0 +1,1 @@
+"""Faults in the running graph: what the head does, and what is forgotten (`./ja faults`)."""

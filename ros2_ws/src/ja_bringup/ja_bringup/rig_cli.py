@@ -1,0 +1,49 @@
+"""The commands that try a rig before it is trusted, for `./ja`."""
+
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to an app."""
+    app.command()(faults)
+
+
+def faults(
+    only: Annotated[
+        str, typer.Option(help='Only faults with this in their name: killed, clock, network, ...')
+    ] = '',
+) -> None:
+    """Do every fault to a simulated rig: kill, freeze, cut, delay; a table of what the head does.
+
+    Exit code 1 when the head did not stop or go on as it has to, or when something was forgotten.
+    """
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from ja_bringup.faults.hosts import CASES, missing, run_on_hosts
+    from ja_bringup.faults.run import COLUMNS, FaultRun, Outcome
+
+    outcomes: list[Outcome] = []
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        run = FaultRun(folder / 'here', typer.echo)
+        if chosen := [fault for fault in run.faults() if only in fault.name]:
+            run.run(chosen)
+            outcomes += run.outcomes
+        if cases := [case for case in CASES if only in case]:
+            if why := missing():
+                typer.echo(f'left out: {", ".join(cases)}: {why}')
+            else:
+                outcomes += [run_on_hosts(case, folder / case, typer.echo) for case in cases]
+    table = Table(*COLUMNS, box=box.MARKDOWN)
+    for outcome in outcomes:
+        table.add_row(*outcome.row())
+    typer.echo()
+    Console(width=130, soft_wrap=True).print(table)
+    sys.exit(int(not outcomes or not all(outcome.well for outcome in outcomes)))
