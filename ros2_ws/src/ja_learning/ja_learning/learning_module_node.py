@@ -7,7 +7,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import torch
 from sensor_msgs.msg import Image, JointState, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
@@ -194,11 +193,11 @@ class LearningModuleNode(GraphNode):
 
 
 def _share_the_interpreter() -> None:
-    """Let the thread that proposes and the one that learns hinder each other little."""
-    # In networks this small, threads of one kernel wait for each other longer than they compute.
-    torch.set_num_threads(1)
-    # So long does the one wait before it asks the other for the interpreter; Python's 5 ms is all
-    # the time that a proposal has (`./ja bench inference`).
+    """Let the thread that proposes not wait long for the one that learns.
+
+    So long does the one wait before it asks the other for the interpreter; Python's 5 ms is all
+    the time that a proposal has (`./ja bench inference`).
+    """
     sys.setswitchinterval(2e-4)
 
 

@@ -2,8 +2,8 @@
 
 The learning module runs in a process of its own at 30 images/s; this process plays the camera, the
 detector and the evaluator, and holds the watch: from the detections' publication to the delta's
-arrival, both journeys included. A trial of a random face lasts for five images, and each is learned;
-checkpoints are written as on a rig.
+arrival, both journeys included. Every five images are a trial of a random face, which is learned; a
+checkpoint is written every ten trials.
 """
 
 import time
