@@ -43,7 +43,7 @@ class GraphNode(Node):
         self.said_topics: dict[str, Topic] = {}
         self.offered_services: dict[str, Any] = {}
         self._diagnostics = self.say(DIAGNOSTICS)
-        self._presence = Presence(self, time.monotonic())
+        self._presence = Presence(self)
         # Wall time, not /clock: a simulation that stands still must be reported as well.
         self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 

@@ -1,5 +1,7 @@
 """Keeps the names of nodes known to each other, however long one of them has stood still."""
 
+import math
+
 from rclpy.node import Node
 
 from ja_common.ros_defaults import LEASE_S
@@ -15,9 +17,10 @@ class Presence:
     `ros2 node list` lacks it for good.
     """
 
-    def __init__(self, node: Node, now_s: float) -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
-        self._looked_s = now_s
+        # From the first look on: while a node loads its model it is nobody's concern yet.
+        self._looked_s = math.inf
         self._present: set[tuple[str, str]] = set()
         self._known: set[tuple[str, str]] = set()
 
