@@ -50,9 +50,8 @@ def run() -> dict[str, Row]:
     rows: dict[str, Row] = {}
     arguments = [part for item in CAMERA.items() for part in ('-p', ':='.join(item))]
     graph = with_arguments(sim_graph(), arguments)
-    mind, head = [], []
-    for spec in with_arguments(sim_graph(), arguments):
-        (head if spec.package == 'ja_sim' else mind).append(spec)
+    head = [spec for spec in graph if spec.package == 'ja_sim']
+    mind = [spec for spec in graph if spec not in head]
     for name, one_process in (('many processes', False), ('one process', True)):
         stopwatch = Stopwatch(HOPS)
         with ExitStack() as beside:
