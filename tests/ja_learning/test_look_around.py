@@ -6,13 +6,14 @@ import pytest
 from ja_learning.core.look_around import LookAround, LookAroundConfig
 
 LOOK = np.array([0.1, -0.05])
+KNOWS = 30.0
 ASIDE = np.array([0.45, 0.0])
 LEFT, RIGHT = LOOK + ASIDE, LOOK - ASIDE
 
 
 def around(mode: str, **settings: float) -> LookAround:
     begun = LookAround(LookAroundConfig(look_around=mode, glance_pan_rad=0.45, **settings))
-    begun.begin(LOOK)
+    begun.begin(LOOK, log_evidence=KNOWS)
     return begun
 
 
@@ -39,7 +40,7 @@ def test_both_sides_are_taken_whatever_is_believed():
     assert views.wanted(never) == pytest.approx(RIGHT)
     assert views.rest(RIGHT)
     assert views.wanted(never) is None
-    views.begin(LOOK)
+    views.begin(LOOK, log_evidence=KNOWS)
     assert views.wanted(never) == pytest.approx(LEFT)
 
 
@@ -49,6 +50,14 @@ def test_both_sides_are_taken_whatever_is_believed():
 def test_the_side_that_may_well_show_it_is_worth_a_glance(left, right, wanted):
     found = around('where_worthwhile', glance_worth=0.1).wanted(believing(left, right))
     assert found is wanted if wanted is None else found == pytest.approx(wanted)
+
+
+def test_who_knows_nothing_looks_everywhere_and_so_may_take_it_for_evidence():
+    views = around('where_worthwhile')
+    views.begin(LOOK, log_evidence=0.0)
+    assert views.wanted(never) == pytest.approx(LEFT)
+    assert views.rest(LEFT)
+    assert views.wanted(never) == pytest.approx(RIGHT)
 
 
 def test_what_has_been_in_view_is_not_looked_for_again():

@@ -197,3 +197,11 @@ def test_standardised_faces_forget_exposure_and_contrast():
 def test_network_without_posture_does_not_see_it():
     network = ThreeLayerNetwork(NetworkConfig(posture_input=False), seed=0)
     assert np.array_equal(network.predict(FACE, (0.5, 0.2)), network.predict(FACE, (0.0, 0.0)))
+
+
+def test_a_trial_that_was_given_up_teaches_nothing():
+    network = ThreeLayerNetwork(NetworkConfig(), seed=0)
+    before = network.state()
+    network.learn(Trial(FACE, np.zeros((1, 2)), None, np.ones((2, 2)), 2))
+    after = network.state()
+    assert all(np.array_equal(before[name], after[name]) for name in before)

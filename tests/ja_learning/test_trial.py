@@ -105,3 +105,26 @@ def test_a_trial_knows_what_was_seen_before_anybody_acted_on_the_face(recorder):
     assert trial.candidates == pytest.approx(np.array([(0.3, 0.0), (-0.4, 0.1), BALL]))
     recorder.look(FACE, CAREGIVER)
     assert recorder.fixate(SECOND, BALL).seen_before_shift == 0
+
+
+def test_a_trial_without_a_fixation_is_given_up_with_the_next_look(recorder):
+    assert recorder.look(FACE, CAREGIVER) is None
+    assert recorder.look(FACE, CAREGIVER) is None, 'the same look goes on'
+    recorder.see([(0.3, 0.0)])
+    recorder.rest(FIRST)
+    recorder.see([(-0.4, 0.1)])
+    given_up = recorder.look(OTHER_FACE, CAREGIVER)
+    assert given_up.face is FACE
+    assert given_up.fixation is None
+    assert given_up.candidates == pytest.approx(np.array([(0.3, 0.0), (-0.4, 0.1)]))
+    with pytest.raises(ValueError, match='given up'):
+        given_up.displacements()
+    assert recorder.face is OTHER_FACE
+    assert len(recorder.candidates) == 0
+
+
+def test_a_trial_that_ended_in_a_fixation_is_not_given_up(recorder):
+    recorder.look(FACE, CAREGIVER)
+    recorder.rest(FIRST)
+    recorder.fixate(FIRST, BALL)
+    assert recorder.look(FACE, CAREGIVER) is None

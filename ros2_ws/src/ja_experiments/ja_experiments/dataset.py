@@ -76,7 +76,7 @@ class Sample:
             return 'label', self.label
         if self.meant is not None:
             return 'truth', self.meant
-        return 'fixation', self.lesson.fixation
+        return 'fixation', self.lesson.led_to
 
 
 def write_dataset(

@@ -100,6 +100,8 @@ class Robot:
             fixation=fixation,
             log_evidence=proposal.log_evidence,
         )
+        if proposal.given_up is not None:
+            self._learner.learn(proposal.given_up)
         if fixation is not None:
             self._learn(fixation, posture)
         decision = self._cycle.step(percept)

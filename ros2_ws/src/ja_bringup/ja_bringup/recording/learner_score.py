@@ -40,9 +40,9 @@ def score_learner(
         ScoredTrial(
             number,
             trial.fixation_ns,
-            float(angle_between(trial.proposed, trial.lesson.fixation)),
+            float(angle_between(trial.proposed, trial.lesson.led_to)),
             trial.is_joint_attention(trial.proposed),
-            trial.is_joint_attention(trial.lesson.fixation),
+            trial.is_joint_attention(trial.lesson.led_to),
         )
         for number, trial in enumerate(recorded_trials(recording, arguments, progress), 1)
     ]

@@ -75,7 +75,7 @@ def sample_of(trial: RecordedTrial, recording: str) -> Sample:
         trial.fixation_ns,
         trial.source,
         trial.meant,
-        trial.is_joint_attention(trial.lesson.fixation),
+        trial.is_joint_attention(trial.lesson.led_to),
     )
 
 

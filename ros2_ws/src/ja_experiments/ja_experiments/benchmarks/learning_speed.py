@@ -3,74 +3,114 @@
 A fresh look every trial, each seed another caregiver; everything that was seen is a candidate, and
 the learner alone chooses among the objects of 500 looks that it never learned from. The paper's
 network learns from the object that it happened to fixate, drawn among all that were seen, as in
-its first stage; of its proposal the nearest object is taken.
+its first stage; of its proposal the nearest object is taken. The ceiling is that of
+`./ja bench world`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ja_experiments.looks import Looks, load_looks
+from ja_experiments.benchmarks.world import ceiling
+from ja_experiments.estimate import over_seeds
+from ja_experiments.looks import POOL, Looks, load_looks
+from ja_experiments.processes import side_by_side
 from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
-from ja_learning.core.learner import Learner
+from ja_learning.core.learner import Learner, LearnerChoice, make_learner
 from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
 from ja_learning.core.trial import Trial
 
-MARKS = {3: (25, 50, 100, 200), 5: (50, 100, 150, 400), 10: (200, 400, 600)}
-SEEDS = range(5)
-_TEST_LOOKS = 500
-# LEARNING geometry of the default scene: where objects may stand, and how near to each other.
+SEEDS = range(10)
+TRIALS = 2000
+TEST_LOOKS = 500
+# Where the objects of the default scene may stand, and how near to her face and to each other.
 _FIELD_RAD = np.radians([40.0, 15.0])
 _FROM_FACE_RAD, _APART_RAD = np.radians([8.0, 5.0])
 
 
+@dataclass(frozen=True)
+class Condition:
+    """What is asked. `pool`: learn from so many looks only, and be tested on them; 0: fresh ones.
+
+    `marks`: after which trials; from `change_at` on she is another caregiver (0: never).
+    """
+
+    name: str
+    objects: int
+    marks: tuple[int, ...]
+    reliability: float = 1.0
+    pool: int = 0
+    change_at: int = 0
+
+
+CONDITIONS = (
+    Condition('5 objects', 5, (25, 50, 100, 150, 400)),
+    Condition('10 objects', 10, (100, 200, 400, 600, 2000)),
+    Condition('5 objects, pool of 125', 5, (100, 200, 300), pool=POOL),
+    Condition('10 objects, pool of 125', 10, (200, 400, 700), pool=POOL),
+    Condition('5 objects, 30 % of looks elsewhere', 5, (100, 150, 200, 400), reliability=0.7),
+    Condition('5 objects, another caregiver after 400', 5, (400, 401, 425, 450), change_at=400),
+)
+KINDS = (GazeLineLearner.kind, ThreeLayerNetwork.kind)
+
+
 def run() -> dict[str, dict[str, Any]]:
     """Success of the learner alone after so many trials: mean over seeds and its 95 % interval."""
+    for seed in SEEDS:
+        load_looks('default', seed, TRIALS + TEST_LOOKS)
+    tasks = [
+        (kind, condition, seed) for condition in CONDITIONS for kind in KINDS for seed in SEEDS
+    ]
+    found = dict(zip(tasks, side_by_side('learning', curve, tasks), strict=True))
     rows: dict[str, dict[str, Any]] = {}
-    longest = max(max(marks) for marks in MARKS.values())
-    looks = {seed: load_looks('default', seed, longest + _TEST_LOOKS) for seed in SEEDS}
-    for kind in (GazeLineLearner.kind, ThreeLayerNetwork.kind):
-        for objects, marks in MARKS.items():
-            curves = np.array([curve(kind, objects, marks, looks[seed], seed) for seed in SEEDS])
-            half = 1.96 * curves.std(axis=0, ddof=1) / np.sqrt(len(curves))
-            for mark, mean, width in zip(marks, curves.mean(axis=0), half, strict=True):
-                rows[f'{kind}, {objects} objects, {mark} trials'] = {
-                    'value': float(mean),
-                    'unit': 'success',
-                    'n': len(curves),
-                    'interval': [float(mean - width), float(mean + width)],
-                }
-    return rows
+    for condition in CONDITIONS:
+        for kind in KINDS:
+            curves = np.array([found[kind, condition, seed] for seed in SEEDS])
+            for mark, shares in zip(condition.marks, curves.T, strict=True):
+                rows[f'{kind}, {condition.name}: {mark} trials'] = _row(shares)
+    return rows | ceiling()
 
 
-def curve(kind: str, objects: int, marks: tuple[int, ...], looks: Looks, seed: int) -> list[float]:
-    """Success of one learner alone, 0-1, after each of `marks` trials."""
-    rng = np.random.default_rng([seed, objects])
-    learner = _untaught(kind, seed)
-    meant = looks.directions - looks.postures
-    tests = [_places(rng, meant[i], objects) for i in range(-_TEST_LOOKS, 0)]
+def curve(kind: str, condition: Condition, seed: int) -> list[float]:
+    """Success of one learner alone, 0-1, after each of the marks."""
+    rng = np.random.default_rng([seed, condition.objects])
+    looks, other = (
+        load_looks('default', s, TRIALS + TEST_LOOKS) for s in (seed, (seed + 1) % len(SEEDS))
+    )
+    learner = make_learner(LearnerChoice(kind), NetworkConfig(), GazeLineConfig(), seed)
     found = []
-    for trial in range(max(marks)):
-        places = _places(rng, meant[trial], objects)
-        fixated = places[rng.integers(objects)]
-        at_her = np.zeros((1, 2))
-        learner.learn(Trial(looks.faces[trial], at_her, fixated, places))
-        if trial + 1 in marks:
-            right = [
-                _chosen(learner, looks.faces[i - _TEST_LOOKS], places) == 0
-                for i, places in enumerate(tests)
-            ]
-            found.append(float(np.mean(right)))
+    for trial in range(1, max(condition.marks) + 1):
+        world = other if condition.change_at and trial > condition.change_at else looks
+        learner.learn(_trial(rng, world, trial, condition))
+        if trial in condition.marks:
+            tested = world[: condition.pool] if condition.pool else world[TRIALS:]
+            found.append(success(learner, tested, condition.objects, seed))
     return found
 
 
-def _untaught(kind: str, seed: int) -> Learner:
-    if kind == GazeLineLearner.kind:
-        return GazeLineLearner(GazeLineConfig(), seed)
-    return ThreeLayerNetwork(NetworkConfig(), seed)
+def success(learner: Learner, looks: Looks, objects: int, seed: int) -> float:
+    """Share of looks in which the learner alone chooses the object that was meant."""
+    right = [
+        _chosen(learner, face, places) == 0
+        for face, places in zip(looks.faces, _tests(looks, objects, seed), strict=True)
+    ]
+    return float(np.mean(right))
+
+
+def _trial(rng: np.random.Generator, looks: Looks, trial: int, condition: Condition) -> Trial:
+    look = int(rng.integers(condition.pool)) if condition.pool else (trial - 1) % TRIALS
+    meant = looks.directions[look] - looks.postures[look]
+    if rng.random() >= condition.reliability:
+        meant = _place(rng, [])
+    places = _places(rng, meant, condition.objects)
+    fixated = places[rng.integers(condition.objects)]
+    shown = rng.permutation(places)
+    return Trial(looks.faces[look], np.zeros((1, 2)), fixated, shown, len(shown))
 
 
 def _chosen(learner: Learner, face: NDArray[np.uint8], places: NDArray[np.float64]) -> int:
@@ -79,14 +119,35 @@ def _chosen(learner: Learner, face: NDArray[np.uint8], places: NDArray[np.float6
     return int(np.argmin(np.hypot(*(places - aim).T)))
 
 
+def _tests(looks: Looks, objects: int, seed: int) -> Iterator[NDArray[np.float64]]:
+    rng = np.random.default_rng([seed, objects, 1])
+    for meant in looks.directions - looks.postures:
+        yield _places(rng, meant, objects)
+
+
 def _places(
     rng: np.random.Generator, meant: NDArray[np.float64], objects: int
 ) -> NDArray[np.float64]:
     """Directions (objects, 2) [rad] from her face, the one that she means first."""
     places = [meant]
     while len(places) < objects:
-        place = rng.uniform(-_FIELD_RAD, _FIELD_RAD)
-        apart = min(np.hypot(*(place - other)) for other in places)
-        if np.hypot(*place) > _FROM_FACE_RAD and apart > _APART_RAD:
-            places.append(place)
+        places.append(_place(rng, places))
     return np.array(places)
+
+
+def _place(rng: np.random.Generator, taken: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    while True:
+        place = rng.uniform(-_FIELD_RAD, _FIELD_RAD)
+        clear = all(np.hypot(*(place - other)) > _APART_RAD for other in taken)
+        if clear and np.hypot(*place) > _FROM_FACE_RAD:
+            return place
+
+
+def _row(shares: NDArray[np.float64]) -> dict[str, Any]:
+    estimate = over_seeds(shares)
+    return {
+        'value': estimate.mean,
+        'unit': 'success',
+        'n': estimate.n,
+        'interval': [estimate.low, estimate.high],
+    }

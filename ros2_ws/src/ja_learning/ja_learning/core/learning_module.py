@@ -21,9 +21,11 @@ class Proposal:
 
     `delta`: to what she means. `glance`: to a view that is worth a glance before that.
     `log_evidence` [nats]: that the face tells the learner something, when it was last asked.
+    `given_up`: the trial before, if this image shows that it was.
     """
 
     log_evidence: float
+    given_up: Trial | None = None
     delta: NDArray[np.float64] | None = None
     glance: NDArray[np.float64] | None = None
 
@@ -53,9 +55,10 @@ class LearningModule:
         """One image: rays (m, 2) to objects, and the face, uint8 (30, 25), if it is attended."""
         trial, here = self._trial, posture.position
         still = posture.is_still(self._still_below)
+        given_up = None
         if face is not None:
-            trial.look(face, here)
-            self._around.begin(here)
+            given_up = trial.look(face, here)
+            self._around.begin(here, self._log_evidence)
         elif still:
             trial.rest(here)
         if trial.face is None:
@@ -68,7 +71,8 @@ class LearningModule:
         believer = self._believer()
         self._log_evidence = believer.log_evidence
         delta = believer.propose(trial.face, trial.look_posture, here, trial.candidates)
-        return Proposal(self._log_evidence, delta, None if view is None else view - here)
+        glance = None if view is None else view - here
+        return Proposal(self._log_evidence, given_up, delta, glance)
 
     def believed(self, rng: np.random.Generator) -> NDArray[np.float64]:
         """Directions (BELIEF_SAMPLES, 2) [rad] of what she may mean; (0, 2) between trials."""

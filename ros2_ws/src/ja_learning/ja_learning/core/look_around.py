@@ -23,8 +23,8 @@ class LookAroundConfig:
 
     look_around: str = parameter(
         'off',
-        'glances before the shift: none, to both sides, or only where what she means may well be '
-        'and has not been in view',
+        'glances before the shift: none, to both sides, or, once the learner knows something, '
+        'only where what she means may well be and has not been in view',
         choices=('off', 'both_sides', 'where_worthwhile'),
     )
     glance_pan_rad: float = parameter(
@@ -32,6 +32,9 @@ class LookAroundConfig:
     )
     glance_view_rad: float = parameter(
         0.3, 'half of the horizontal field of view', low=0.02, high=1.5
+    )
+    knows_above_nats: float = parameter(
+        20.0, 'log evidence above which the learner knows something', low=-50.0, high=50.0
     )
     glance_worth: float = parameter(
         0.1,
@@ -48,9 +51,16 @@ class LookAround:
         self._config = config
         self._taken: list[NDArray[np.float64]] = []
         self._left: list[NDArray[np.float64]] = []
+        self._everywhere = False
 
-    def begin(self, look: ArrayLike) -> None:
-        """The head looks at the caregiver from this posture (2,) [rad]."""
+    def begin(self, look: ArrayLike, log_evidence: float) -> None:
+        """The head looks at the caregiver from this posture (2,) [rad].
+
+        `log_evidence` [nats]: that the learner knows something. Who knows nothing must look
+        everywhere, or would never see that the caregiver means what lies outside the first view.
+        """
+        c = self._config
+        self._everywhere = c.look_around == 'both_sides' or log_evidence < c.knows_above_nats
         self._taken = [np.array(look, float)]
         self._left = []
         if self._config.look_around != 'off':
@@ -60,7 +70,7 @@ class LookAround:
     def rest(self, posture: ArrayLike) -> bool:
         """The head rests at a posture (2,) [rad]: was it led there by nothing that the face told?
 
-        So it is at the look and, if both sides are always taken, at the sides. Resting anywhere
+        So it is at the look and, if both sides are taken anyway, at the sides. Resting anywhere
         else it has shifted, and glances no more.
         """
         for view in self._left:
@@ -70,14 +80,14 @@ class LookAround:
         if not any(_near(view, posture) for view in self._taken):
             self._left = []
             return False
-        return self._config.look_around == 'both_sides' or _near(self._taken[0], posture)
+        return self._everywhere or _near(self._taken[0], posture)
 
     def wanted(self, believed: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64] | None:
         """The next view (2,) [rad] that is worth its time, or None.
 
         `believed` draws directions (n, 2) [rad] of what she may mean; asked only where it decides.
         """
-        if not self._left or self._config.look_around == 'both_sides':
+        if not self._left or self._everywhere:
             return next(iter(self._left), None)
         directions = believed()
         unseen = ~np.any([self._in_view(view, directions) for view in self._taken], axis=0)

@@ -121,7 +121,12 @@ class ThreeLayerNetwork:
         return taken
 
     def learn(self, trial: Trial) -> None:
-        """Back-propagation on the pairs of one trial, one step a pair, in the order they came."""
+        """Back-propagation on the pairs of one trial, one step a pair, in the order they came.
+
+        A trial that was given up teaches nothing.
+        """
+        if trial.fixation is None:
+            return
         self._weigh(trial)
         chosen = slice(-1, None) if self.config.pairs == 'last' else slice(None)
         inputs = self._inputs(trial.face, trial.postures[chosen])

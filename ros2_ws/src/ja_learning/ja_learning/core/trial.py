@@ -1,7 +1,7 @@
 """A trial as the learner lives it: a face, the postures visited, what was fixated in the end.
 
 Nobody announces a trial. It begins with a look at the caregiver and ends with the first fixation
-after it; a look without fixation before the next one leaves nothing to learn.
+after it, or is given up: the head looks at her again. What was seen was seen in any case.
 """
 
 from dataclasses import dataclass, field
@@ -40,20 +40,28 @@ class Trial:
     """What one trial gives to learn from.
 
     `face`: uint8 (30, 25). `postures`: (n, 2) [rad], where each shift began, the look at the
-    caregiver first. `fixation`: (2,) [rad], direction of the object fixated at the end.
+    caregiver first. `fixation`: (2,) [rad], direction of the object fixated at the end, or
+    None when the trial was given up.
     `candidates`: (m, 2) [rad], directions of all objects that were seen meanwhile; the first
     `seen_before_shift` of them were seen before anybody acted on what the face told.
     """
 
     face: NDArray[np.uint8]
     postures: NDArray[np.float64]
-    fixation: NDArray[np.float64]
+    fixation: NDArray[np.float64] | None
     candidates: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     seen_before_shift: int = 0
 
+    @property
+    def led_to(self) -> NDArray[np.float64]:
+        """The fixation, (2,) [rad]; ValueError when the trial was given up."""
+        if self.fixation is None:
+            raise ValueError('a trial that was given up has led nowhere')
+        return self.fixation
+
     def displacements(self) -> NDArray[np.float64]:
         """What remained to turn at each posture, shape (n, 2) [rad]: the target of learning."""
-        return self.fixation - self.postures
+        return self.led_to - self.postures
 
 
 class TrialRecorder:
@@ -72,12 +80,20 @@ class TrialRecorder:
         """The face seen in the last look of the trial under way, or None between trials."""
         return self._face
 
-    def look(self, face: ArrayLike, posture: ArrayLike) -> None:
-        """The head attends to the caregiver: a trial begins, or its look goes on."""
+    def look(self, face: ArrayLike, posture: ArrayLike) -> Trial | None:
+        """The head attends to the caregiver: a trial begins, or its look goes on.
+
+        The trial before, if it was given up.
+        """
+        given_up = None
+        if self._face is not None and len(self._postures) > 1:
+            given_up = self._ended(self._postures, None)
         self._face = checked_face(face)
         self._postures = [np.array(posture, float)]
         self._candidates = []
+        self._seen_before_shift = 0
         self._looking_around = True
+        return given_up
 
     def rest(self, posture: ArrayLike) -> None:
         """The head stands still at a posture (2,) [rad]; repeated postures count once."""
@@ -121,15 +137,17 @@ class TrialRecorder:
             began = began[:-1]  # where the last shift ended, none began
         if self._face is None or not began:
             return None
-        trial = Trial(
-            self._face,
-            np.array(began),
-            np.array(direction, float),
-            self.candidates,
-            self._seen_before_shift,
-        )
+        trial = self._ended(began, np.array(direction, float))
         self.forget()
         return trial
+
+    def _ended(
+        self, began: list[NDArray[np.float64]], fixation: NDArray[np.float64] | None
+    ) -> Trial:
+        assert self._face is not None
+        return Trial(
+            self._face, np.array(began), fixation, self.candidates, self._seen_before_shift
+        )
 
     def forget(self) -> None:
         """Drop the trial under way."""
