@@ -14,6 +14,8 @@ import cv2
 import numpy as np
 import pytest
 
+from ja_learning.core.checkpoint import load_checkpoint
+
 pytestmark = pytest.mark.usefixtures('domain')
 
 
@@ -56,6 +58,37 @@ def test_the_demo_runs_to_its_end(options, tmp_path):
     picture = cv2.imread(str(curve.with_suffix('.png')))
     assert picture is not None
     assert picture.std() > 5
+    assert (curve.parent / 'checkpoints' / 'last.npz').exists()
+    assert int((curve.parent / 'trials').read_text()) >= 3
+
+
+def test_a_run_that_left_nothing_cannot_be_resumed(tmp_path):
+    process = start(tmp_path, 'demo', '--resume', 'runs')
+    output, _ = process.communicate(timeout=30)
+    assert process.returncode == 1
+    assert output == 'error: runs cannot be resumed: there is no checkpoint in runs/checkpoints\n'
+
+
+@pytest.mark.slow
+def test_a_demo_is_resumed_where_it_ended(tmp_path):
+    first = start(tmp_path, 'demo', '--trials', '10', '--exam', '0', '--one-process')
+    output, _ = first.communicate(timeout=90)
+    assert first.returncode == 0, output
+    [run] = tmp_path.glob('runs/*-demo')
+    trials = int((run / 'trials').read_text())
+    learned = trials_learned(run)
+
+    options = ['--trials', '5', '--exam', '0', '--resume', str(run)]
+    second = start(tmp_path, 'demo', *options)
+    output, _ = second.communicate(timeout=90)
+    assert second.returncode == 0, output
+    assert f'goes on from {run / "checkpoints"}' in logs(tmp_path)
+    assert int((run / 'trials').read_text()) >= trials + 5
+    assert trials_learned(run) > learned
+
+
+def trials_learned(run: Path) -> int:
+    return load_checkpoint(run / 'checkpoints' / 'last.npz')[1]['trials']
 
 
 def wait_for_log(folder: Path, process: subprocess.Popen, timeout_s: float = 30.0) -> list[int]:
