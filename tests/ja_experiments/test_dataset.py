@@ -1,5 +1,6 @@
 """Data sets of trials: written, read, labelled by a person, and learned from."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -119,13 +120,20 @@ def test_objects_are_placed_around_where_she_was_looked_at(places: ObjectsSpec) 
     assert found.tilt_deg == pytest.approx((-25, 30))
 
 
-def test_the_experiment_learns_from_recorded_looks(tmp_path: Path, folder: Path) -> None:
+def test_the_experiment_learns_from_recorded_looks(tmp_path: Path, samples: list[Sample]) -> None:
+    """Of somebody who never meant anything out of view."""
+    seen = [s for s in samples if (np.abs(s.meant - s.lesson.postures[0]) < (0.28, 0.2)).all()]
+    folder = write_dataset(tmp_path / 'data', seen, (), '').parent
     config = StudyConfig(
-        plan=Plan(trials=3000, seeds=(0,), test_trials=200), data=str(folder), pool=110
+        plan=Plan(trials=3000, seeds=(0,), test_trials=200), data=str(folder), pool=15
     )
     path = write_report(run_study(config, Progress()), tmp_path / 'report')
     text = path.read_text()
-    assert '110 recorded looks of 125 (`data`)' in text
-    assert '15 other looks' in text
+    assert f'15 recorded looks of {len(seen)} (`data`)' in text
+    assert f'{len(seen) - 15} other looks' in text
     assert 'Figure 7' not in text
-    assert (tmp_path / 'report' / 'figure-6b.png').exists()
+    assert (path.parent / 'figure-6b.png').exists()
+    numbers = json.loads((path.parent / 'results.json').read_text(), parse_constant=pytest.fail)
+    alone = numbers['figure 6']['pairs all, 3 objects']['alone']
+    assert alone['end, pool, out of view'] == [None]
+    assert 0 <= alone['end, pool, in view'][0] <= 1

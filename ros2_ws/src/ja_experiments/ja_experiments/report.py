@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
 import platform
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from importlib import metadata, resources
 from pathlib import Path
@@ -246,7 +247,7 @@ def _condition_numbers(condition: Condition) -> dict[str, Any]:
             view: _estimate(over_seeds(condition.online(-1, flag))) for view, flag in views.items()
         },
         'alone': {
-            f'{stage}, {looks}, {view}': condition.alone(stage, looks, flag).round(4).tolist()
+            f'{stage}, {looks}, {view}': _plain(condition.alone(stage, looks, flag))
             for stage in condition.runs[0].alone
             for looks in _LOOKS
             for view, flag in views.items()
@@ -257,8 +258,14 @@ def _condition_numbers(condition: Condition) -> dict[str, Any]:
     }
 
 
-def _estimate(estimate: Estimate) -> dict[str, float]:
-    return {key: round(value, 5) for key, value in asdict(estimate).items()}
+def _estimate(estimate: Estimate) -> dict[str, float | None]:
+    numbers = asdict(estimate)
+    return dict(zip(numbers, _plain(numbers.values()), strict=True))
+
+
+def _plain(numbers: Iterable[float]) -> list[float | None]:
+    """For JSON, which has no word for 'not a number'."""
+    return [None if math.isnan(number) else round(float(number), 5) for number in numbers]
 
 
 def _table(header: Sequence[str], rows: Rows) -> str:
