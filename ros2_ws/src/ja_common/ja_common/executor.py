@@ -1,8 +1,9 @@
 """A single-threaded executor that keeps its wait set, and serves messages as they were said."""
 
 import inspect
+import time
 from collections import deque
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from functools import partial
 from operator import itemgetter
 from typing import Any
@@ -18,6 +19,9 @@ from rclpy.waitable import NumberOfEntities
 _FOREVER_NS = -1
 # As rclpy's C++ names what can be waited for, in the order in which a node's are served.
 _KINDS = ('timer', 'subscription', 'guard_condition', 'client', 'service')
+_PROMPT_KINDS = _KINDS[:-1]
+# The longest that a service waits while messages follow each other.
+_PATIENCE_S = 0.02
 
 
 class KeptWaitSetExecutor(SingleThreadedExecutor):
@@ -26,7 +30,8 @@ class KeptWaitSetExecutor(SingleThreadedExecutor):
     rclpy's collects all entities before every wait, wakes itself after every callback and wraps
     each in a task; for the whole graph in one process that takes longer than what the nodes
     compute (docs/ros_defaults.md). Here the entities are collected anew only when a node has made
-    or destroyed one.
+    or destroyed one. And while messages follow each other, only every 20 ms are all waited for:
+    most are services, which the graph has many of and hardly anybody asks.
 
     Messages that are ready together are served in the order in which they were published, on
     whatever topics, so that a cause comes before its effects however late this process wakes:
@@ -37,28 +42,29 @@ class KeptWaitSetExecutor(SingleThreadedExecutor):
     """
 
     def __init__(self, *, context: Context | None = None) -> None:
-        self._wait_set: _WaitSet | None = None
+        self._wait_sets: tuple[_WaitSet, _WaitSet] | None = None
+        self._patient_until_s = 0.0
         self._ready: deque[Callable[[], Any]] = deque()
         super().__init__(context=context)
 
     def add_node(self, node: Node) -> bool:
         """Serve a node; False when it was served already."""
-        self._wait_set = None
+        self._wait_sets = None
         return super().add_node(node)
 
     def remove_node(self, node: Node) -> None:
         """Serve it no longer."""
-        self._wait_set = None
+        self._wait_sets = None
         super().remove_node(node)
 
     def wake(self) -> None:
         """A node has made or destroyed an entity, or the context ends."""
-        self._wait_set = None
+        self._wait_sets = None
         super().wake()
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
         """Stop, and let go of the nodes."""
-        self._wait_set = None
+        self._wait_sets = None
         self._ready.clear()
         return super().shutdown(timeout_sec)
 
@@ -80,10 +86,16 @@ class KeptWaitSetExecutor(SingleThreadedExecutor):
 
     def _wait(self, timeout_sec: float | None) -> None:
         self._check_context()
-        wait_set = self._wait_set or self._collect()
-        self._wait_set = wait_set
-        forever = timeout_sec is None or timeout_sec < 0.0
-        wait_set.wait(_FOREVER_NS if forever else int(1e9 * timeout_sec))  # type: ignore[operator]
+        everything, prompt = self._wait_sets = self._wait_sets or self._collect()
+        timeout_ns = _FOREVER_NS if timeout_sec is None else int(1e9 * timeout_sec)
+        patience_ns = int(1e9 * (self._patient_until_s - time.monotonic()))
+        if patience_ns > 0:
+            wait_set = prompt
+            wait_set.wait(min(timeout_ns, patience_ns) if timeout_ns >= 0 else patience_ns)
+        else:
+            wait_set = everything
+            wait_set.wait(timeout_ns)
+            self._patient_until_s = time.monotonic() + _PATIENCE_S
         self._check_context()
         messages = []
         for kind, entity in wait_set.ready():
@@ -102,9 +114,15 @@ class KeptWaitSetExecutor(SingleThreadedExecutor):
         if not self._context.ok():
             raise ExternalShutdownException
 
-    def _collect(self) -> '_WaitSet':
+    def _collect(self) -> tuple['_WaitSet', '_WaitSet']:
+        """Two wait sets: of everything, and of what is served promptly."""
         nodes = sorted(self.get_nodes(), key=Node.get_fully_qualified_name)
-        return _WaitSet(nodes, [self._guard, self._sigint_gc], self._context)
+        wakers = [self._guard, self._sigint_gc]
+        waitables = [waitable for node in nodes for waitable in node.waitables]
+        return (
+            _WaitSet(nodes, _KINDS, wakers, waitables, self._context),
+            _WaitSet(nodes, _PROMPT_KINDS, wakers, [], self._context),
+        )
 
     def _run_tasks(self) -> None:
         """Run what waits for the ends of futures."""
@@ -118,16 +136,23 @@ class KeptWaitSetExecutor(SingleThreadedExecutor):
 class _WaitSet:
     """Everything that some nodes wait for; `wait`, then ask for what is `ready`."""
 
-    def __init__(self, nodes: list[Node], wakers: list[Any], context: Context) -> None:
+    def __init__(
+        self,
+        nodes: list[Node],
+        kinds: Sequence[str],
+        wakers: list[Any],
+        waitables: list[Any],
+        context: Context,
+    ) -> None:
+        self._kinds = kinds
+        self._waitables = waitables
         self._entities: list[tuple[str, int, Any]] = []
         handles: dict[str, list[Any]] = {kind: [] for kind in _KINDS}
-        self._waitables: list[Any] = []
         for node in nodes:
-            for kind in _KINDS:
+            for kind in kinds:
                 for entity in getattr(node, 'guards' if kind == 'guard_condition' else f'{kind}s'):
                     handles[kind].append(entity.handle)
                     self._entities.append((kind, entity.handle.pointer, entity))
-            self._waitables += node.waitables
         handles['guard_condition'] += [waker.handle for waker in wakers]
         count = sum(
             (waitable.get_num_entities() for waitable in self._waitables),
@@ -147,7 +172,7 @@ class _WaitSet:
         )
         self._handles = [
             (getattr(self._rcl, f'add_{kind}'), handle)
-            for kind in _KINDS
+            for kind in kinds
             for handle in handles[kind]
         ]
 
@@ -165,7 +190,7 @@ class _WaitSet:
         for waitable in self._waitables:
             if waitable.is_ready(self._rcl):
                 yield 'waitable', waitable
-        ready = {kind: set(self._rcl.get_ready_entities(kind)) for kind in _KINDS}
+        ready = {kind: set(self._rcl.get_ready_entities(kind)) for kind in self._kinds}
         for kind, pointer, entity in self._entities:
             if pointer in ready[kind] and (kind != 'timer' or entity.handle.is_timer_ready()):
                 yield kind, entity

@@ -63,6 +63,7 @@ class Renderer:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
         self._scene = mujoco.MjvScene(model, maxgeom=1000)
         self._options = mujoco.MjvOption()
+        self._no_perturbation = mujoco.MjvPerturb()
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
         self._camera.fixedcamid = model.camera(camera).id
@@ -73,15 +74,11 @@ class Renderer:
     def draw(self) -> np.ndarray:
         """Draw the scene as it stands (kinematics must be current)."""
         self._gl.make_current()
-        mujoco.mjv_updateScene(
-            self._model,
-            self._data,
-            self._options,
-            None,
-            self._camera,
-            mujoco.mjtCatBit.mjCAT_ALL,
-            self._scene,
-        )
+        model, data, options, scene = self._model, self._data, self._options, self._scene
+        # The room last: what stands before it hides much of it, and what is hidden costs nothing.
+        moving, fixed = mujoco.mjtCatBit.mjCAT_DYNAMIC, mujoco.mjtCatBit.mjCAT_STATIC
+        mujoco.mjv_updateScene(model, data, options, None, self._camera, moving, scene)
+        mujoco.mjv_addGeoms(model, data, options, self._no_perturbation, fixed, scene)
         mujoco.mjr_render(self._viewport, self._scene, self._context)
         mujoco.mjr_readPixels(self._image, None, self._viewport, self._context)
         upright = self._image[::-1]  # OpenGL's first row is the lowest
