@@ -166,11 +166,12 @@ class SalientFeatureDetectorNode(GraphNode):
                 encode_image(percept.face_image, header.stamp, header.frame_id)
             )
         self._says_detections.publish(encode_detections(header, percept.detections))
+        # For people: mostly nobody is there.
         for publisher, detection in (
             (self._says_target, percept.target),
             (self._says_face, caregiver_face(percept.detections)),
         ):
-            if detection is not None:
+            if detection is not None and publisher.get_subscription_count():
                 publisher.publish(_point(header, detection))
 
     def _draw(
