@@ -20,7 +20,6 @@ from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 
 from ja_bringup.graph import NodeSpec
-from ja_bringup.recorder_node import RecorderConfig
 from ja_bringup.recording.qos_text import offered_text
 from ja_bringup.recording.recording_folder import Channel, Limits, RecordingFolder
 from ja_bringup.sros_policy import policy_xml
@@ -46,8 +45,8 @@ COMPANIONS = (
 )
 """Beside the graph, and no part of it: what they hear and say is whatever there is."""
 
-# Parameters that have no default which a node could start with.
-_MUST_BE_GIVEN = ('source', 'recording')
+# What the page says of the parameters that `_stand_ins` sets.
+_STOOD_IN_FOR = {'source': '(must be given)', 'recording': '(must be given)', 'folder': "''"}
 # What rclpy declares by itself on every node.
 _NOT_OURS = ('use_sim_time', 'start_type_description_service')
 
@@ -182,10 +181,8 @@ def _qos(profile: QoSProfile) -> str:
 
 
 def _default(node: GraphNode, name: str) -> str:
-    if name in _MUST_BE_GIVEN:
-        return '(must be given)'
-    if name == 'folder':
-        return repr(RecorderConfig.folder)  # not where it records just now
+    if name in _STOOD_IN_FOR:
+        return _STOOD_IN_FOR[name]
     value = node.get_parameter(name).value
     return repr(round(value, 6)) if isinstance(value, float) else repr(value)
 
