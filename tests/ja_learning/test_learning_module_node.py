@@ -1,5 +1,7 @@
 """`learning_module`: proposes while a trial is under way, learns once a fixation, remembers."""
 
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 from rclpy.parameter import Parameter
@@ -267,22 +269,40 @@ def test_without_a_place_saving_and_loading_say_so(life):
         assert 'checkpoint_folder is empty' in response.message
 
 
+@pytest.fixture
+def full_disk(monkeypatch):
+    """A context in which nothing can be written."""
+
+    @contextmanager
+    def full():
+        def refuse(*_args, **_kwargs):
+            raise OSError(28, 'No space left on device')
+
+        with monkeypatch.context() as broken:
+            broken.setattr(np, 'savez', refuse)
+            yield
+
+    return full
+
+
 def test_a_checkpoint_that_cannot_be_written_is_told_and_learning_goes_on(
-    make_life, tmp_path, monkeypatch
+    make_life, tmp_path, full_disk
 ):
     life = make_life(checkpoint_folder=str(tmp_path), checkpoint_every_trials=1)
-
-    def full(*_args, **_kwargs):
-        raise OSError(28, 'No space left on device')
-
-    with monkeypatch.context() as broken:
-        broken.setattr(np, 'savez', full)
+    with full_disk():
         life.trial()
         life.look()
         life.bench.wait_for_complaint('learning: [Errno 28] No space left on device')
     life.trial()
-    life.look()
     assert list(tmp_path.glob('paper-*.npz'))
+
+
+def test_what_cannot_be_forgotten_for_good_is_told(make_life, tmp_path, full_disk):
+    life = make_life(checkpoint_folder=str(tmp_path))
+    with full_disk():
+        assert life.bench.set_parameter('learner', 'gaze_line').successful
+        assert 'a restart would bring back what was forgotten' in life.bench.complaint()
+    assert life.look().name
 
 
 @pytest.mark.parametrize(

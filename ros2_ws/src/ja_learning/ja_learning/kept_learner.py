@@ -58,8 +58,13 @@ class KeptLearner:
     def begin_anew(self) -> None:
         """Forget everything; a restart will not bring it back."""
         self._replace(self._make())
-        if self._checkpoints is not None:
+        if self._checkpoints is None:
+            return
+        try:
             self._lessons.ask(self._checkpoints.save)
+        except (ValueError, OSError) as error:
+            text = f'a restart would bring back what was forgotten: {error}'
+            self._node.problem('checkpoints', text)
 
     def tell(self) -> None:
         """Put into the node's health how far learning is, and what went wrong with it."""

@@ -2,8 +2,8 @@
 
 The learning module runs in a process of its own at 30 images/s; this process plays the camera, the
 detector and the evaluator, and holds the watch: from the detections' publication to the delta's
-arrival, both journeys included. Every five images are a trial of a random face, which is learned; a
-checkpoint is written every ten trials.
+arrival, both journeys included. Every five images are a trial of a random face, which is learned;
+every ten trials a checkpoint is written.
 """
 
 import time
