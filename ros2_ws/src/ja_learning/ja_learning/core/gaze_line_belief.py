@@ -31,6 +31,7 @@ class GazeLineBelief:
         self._network, self._log_weights = network, log_weights
         self._top_down, self._plausible_within = top_down, plausible_within_nats
         self.log_evidence = log_evidence
+        self._coded: tuple[object, torch.Tensor] | None = None
 
     def propose(
         self, face: ArrayLike, look: ArrayLike, posture: ArrayLike, candidates: ArrayLike
@@ -78,6 +79,12 @@ class GazeLineBelief:
         return self._mixed(self._gaze(faces), places) - 2 * np.log(ANGLE_SCALE_RAD)
 
     def _gaze(self, faces: ArrayLike) -> torch.Tensor:
+        """u, (members, n, 2). One face is asked about on every image of a trial: coded once."""
+        if self._coded is None or self._coded[0] is not faces:
+            self._coded = faces, self._code(faces)
+        return self._coded[1]
+
+    def _code(self, faces: ArrayLike) -> torch.Tensor:
         pictures = np.array(faces, np.uint8).reshape(-1, 1, *np.shape(faces)[-2:])
         with torch.no_grad():
             return self._network.gaze(standardised(pictures))
