@@ -16,6 +16,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 from ja_common.core.geometry import angle_between, directions_of_vectors
+from ja_experiments.benchmarks.centerface import CenterFace
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.box import Box
 from ja_perception.core.face_crop import crop_face
@@ -196,12 +197,26 @@ def haar(image: np.ndarray) -> list[Box]:
     return boxes
 
 
-DETECTORS: dict[str, Callable[[np.ndarray], list[Box]]] = {'BlazeFace': blazeface, 'Haar': haar}
+def centerface(image: np.ndarray) -> list[Box]:
+    """Faces that CenterFace finds."""
+    return _centerface().find(image)
+
+
+DETECTORS: dict[str, Callable[[np.ndarray], list[Box]]] = {
+    'BlazeFace': blazeface,
+    'CenterFace': centerface,
+    'Haar': haar,
+}
 
 
 @cache
 def _blazeface() -> BlazeFace:
     return BlazeFace()
+
+
+@cache
+def _centerface() -> CenterFace:
+    return CenterFace()
 
 
 @cache
