@@ -54,6 +54,10 @@ EXAMPLES: dict[str, dict[str, str]] = {
         './ja faults': 'every fault, once; a table after four minutes',
         './ja faults --only network': 'those with this in their name',
     },
+    'soak': {
+        './ja soak --time 28800': 'a night',
+        './ja soak --time 600 --camera-rate-hz 30 --ros-args -p scene:=easy': 'ten minutes, quick',
+    },
     'doctor': {
         './ja doctor': 'what is wrong, and how to mend it',
         "./ja doctor --json | jq '.[] | select(.well | not)'": 'only what is wrong',

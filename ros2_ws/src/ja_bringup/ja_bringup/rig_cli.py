@@ -11,6 +11,7 @@ import typer
 def register(app: typer.Typer) -> None:
     """Add the commands to an app."""
     app.command()(faults)
+    app.command()(soak)
 
 
 def faults(
@@ -47,3 +48,38 @@ def faults(
     typer.echo()
     Console(width=130, soft_wrap=True).print(table)
     sys.exit(int(not outcomes or not all(outcome.well for outcome in outcomes)))
+
+
+def soak(
+    context: typer.Context,
+    time_s: Annotated[
+        float, typer.Option('--time', min=60.0, help='Run for so many seconds; hours are meant.')
+    ] = 3600.0,
+    camera_rate_hz: Annotated[
+        float, typer.Option(min=1.0, max=240.0, help='Images a second of the simulated camera.')
+    ] = 15.0,
+) -> None:
+    """Run the whole graph in real time for long; a table of what grows, slows down, or is lost."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from ja_bringup.graph import sim_graph, with_arguments
+    from ja_bringup.run import new_run_folder
+    from ja_bringup.soak import COLUMNS, Soak
+
+    folder = new_run_folder('soak').absolute()
+    settings = {
+        'lockstep': 'false',
+        'camera_rate_hz': str(camera_rate_hz),
+        'checkpoint_folder': str(folder / 'checkpoints'),
+        'trials_file': str(folder / 'trials'),
+    }
+    arguments = [part for item in settings.items() for part in ('-p', ':='.join(item))]
+    run = Soak(with_arguments(sim_graph(), [*arguments, *(context.obj or [])]), folder, typer.echo)
+    code = run.run(time_s)
+    table = Table(*COLUMNS, box=box.MARKDOWN)
+    for series in run.series():
+        table.add_row(*series.row())
+    Console(width=130, soft_wrap=True).print(table)
+    sys.exit(code)
