@@ -20,7 +20,7 @@ from ja_experiments.processes import side_by_side
 from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
 from ja_sim.core.scene import load_scene
 
-SEEDS = range(5)
+SEEDS = range(3)
 TRIALS, LAST = 400, 100
 OBJECTS = (1, 3, 5, 10)
 BEFORE_CHANGE = 200
@@ -38,7 +38,6 @@ GATES: dict[str, dict[str, Any]] = {
     'sigmoid, centre 100': {
         'gating': 'sigmoid', 'sigmoid_centre_trials': 100.0, 'sigmoid_slope_trials': 15.0,
     },
-    'learner never': {'gating': 'constant', 'p_lm_max': 0.0},
 }  # fmt: skip
 
 
