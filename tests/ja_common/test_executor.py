@@ -124,3 +124,22 @@ def test_the_end_of_the_context_ends_the_spinning(executor, node, ros_context):
     node.create_timer(0.001, ros_context.shutdown)
     with pytest.raises(ExternalShutdownException):
         spin_until(executor, lambda: False)
+
+
+def test_a_service_is_served_while_messages_follow_each_other(executor, node):
+    heard = []
+
+    def say_another(message: Int32) -> None:
+        heard.append(message.data)
+        publisher.publish(Int32(data=message.data + 1))
+
+    node.create_subscription(Int32, 'number', say_another, 10)
+    publisher = node.create_publisher(Int32, 'number', 10)
+    node.create_service(Trigger, 'ask', lambda _, response: response)
+    client = node.create_client(Trigger, 'ask')
+    spin_until(executor, client.service_is_ready)
+    publisher.publish(Int32(data=0))
+    spin_until(executor, lambda: len(heard) > 100)
+    answered = client.call_async(Trigger.Request())
+    spin_until(executor, answered.done)
+    assert heard == list(range(len(heard)))
