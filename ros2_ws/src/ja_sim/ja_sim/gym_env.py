@@ -31,8 +31,8 @@ SETTLING_STEPS = 50
 class JointAttentionEnv(gymnasium.Env):
     """Observation: ``image`` (H, W, 3) uint8 RGB and ``posture`` (2,) pan, tilt [rad].
 
-    Action: change of posture (2,) [rad]. ``info`` holds ``trial``, and at the end ``fixated`` and
-    ``attended``, indices of objects.
+    Action: change of posture (2,) [rad]. ``info`` holds ``trial``, the ``camera`` (fx, fy, cx, cy)
+    [pixels], and at the end ``fixated`` and ``attended``, indices of objects.
     """
 
     metadata = {'render_modes': ['rgb_array'], 'render_fps': round(1 / SHIFT_S)}  # noqa: RUF012
@@ -71,7 +71,7 @@ class JointAttentionEnv(gymnasium.Env):
             self._look_away()
         self._look_at_caregiver()
         self._shifts = 0
-        return self._observation(), {'trial': self._world.truth().trial}
+        return self._observation(), self._info(self._world.truth())
 
     def step(
         self, action: np.ndarray
@@ -83,7 +83,7 @@ class JointAttentionEnv(gymnasium.Env):
         self._shifts += 1
         truth = world.truth()
         fixated = self._fixated(truth)
-        info: dict[str, Any] = {'trial': truth.trial}
+        info = self._info(truth)
         if fixated is not None:
             info |= {'fixated': fixated, 'attended': truth.attended}
         reward = float(fixated is not None and fixated == truth.attended)
@@ -105,6 +105,10 @@ class JointAttentionEnv(gymnasium.Env):
             'image': self._world.observe().image,
             'posture': np.clip(posture, box.low, box.high),
         }
+
+    def _info(self, truth: Truth) -> dict[str, Any]:
+        seen = self._world.observe()
+        return {'trial': truth.trial, 'camera': (seen.fx, seen.fy, seen.cx, seen.cy)}
 
     def _fixated(self, truth: Truth) -> int | None:
         rays = rays_of_directions(truth.posture, truth.directions)

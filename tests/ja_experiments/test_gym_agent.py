@@ -1,0 +1,35 @@
+"""The learners of the project live in the Gymnasium world, too."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+from ja_experiments.gym_agent import GymAgent
+from ja_learning.core.gaze_line import GazeLineConfig
+from ja_learning.core.learner import LearnerChoice, make_learner
+from ja_learning.core.network import NetworkConfig
+
+
+@pytest.mark.parametrize('kind', ['paper', 'gaze_line'])
+def test_a_learner_learns_from_the_episodes_it_ends(kind):
+    learner = make_learner(
+        LearnerChoice(kind), NetworkConfig(), GazeLineConfig(members=2, channels=2), seed=0
+    )
+    agent = GymAgent(learner, p_lm=0.0, seed=0)
+    env = gymnasium.make(
+        'ja_sim.gym_env:JointAttention-v0', scene='easy', image_size=(160, 120), max_shifts=3
+    )
+    ended = 0
+    for episode in range(6):
+        observation, info = env.reset(seed=1 if episode == 0 else None)
+        over = fixated = False
+        while not over:
+            action = agent.act(observation, info)
+            assert np.isfinite(action).all()
+            observation, _, fixated, given_up, info = env.step(action.astype(np.float32))
+            over = fixated or given_up
+        agent.act(observation, info)  # it sees where the last shift has led
+        ended += fixated
+    env.close()
+    assert ended >= 4, 'visual feedback ends most episodes on some object'
+    assert learner.trials >= 4
