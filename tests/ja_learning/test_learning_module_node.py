@@ -12,7 +12,16 @@ from ja_common.core.detection import Detection, Kind
 from ja_common.detection_codec import encode_detections
 from ja_common.image_codec import encode_image
 from ja_common.point_cloud_codec import decode_columns
-from ja_common.topics import BELIEF, DETECTIONS, FACE_IMAGE, FIXATION, JOINT_STATES, LM_DELTA
+from ja_common.topics import (
+    BELIEF,
+    DETECTIONS,
+    EVIDENCE,
+    FACE_IMAGE,
+    FIXATION,
+    GLANCE_DELTA,
+    JOINT_STATES,
+    LM_DELTA,
+)
 from ja_learning.core.learning_module import BELIEF_SAMPLES
 from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
 from ja_learning.core.trial import Trial
@@ -21,6 +30,7 @@ from node_bench import header, joint_state
 
 MS = 1_000_000
 ATTENDED = Detection(Kind.FACE, 0.0, 0.0, 0, 0, 40, 48, 1.0, attended=True)
+BALL = Detection(Kind.OBJECT, -0.2, 0.1, 0, 0, 10, 10, 1.0)
 PASSING = Detection(Kind.FACE, 0.1, 0.0, 0, 0, 40, 48, 1.0)
 FACE = np.random.default_rng(0).integers(0, 256, (30, 25)).astype(np.uint8)
 SAYS = [DETECTIONS, FACE_IMAGE, FIXATION, JOINT_STATES]
@@ -82,7 +92,8 @@ class Life:
 @pytest.fixture
 def make_life(make_bench):
     def make(**parameters):
-        return Life(make_bench(LearningModuleNode, SAYS, [LM_DELTA], **parameters))
+        hears = [LM_DELTA, GLANCE_DELTA, EVIDENCE]
+        return Life(make_bench(LearningModuleNode, SAYS, hears, **parameters))
 
     return make
 
@@ -337,9 +348,8 @@ def test_another_learner_may_be_chosen_while_the_node_runs(make_bench):
     life = Life(bench)
     life.trial()
     assert bench.set_parameter('learner', 'gaze_line').successful
-    red = Detection(Kind.OBJECT, -0.2, 0.1, 0, 0, 10, 10, 1.0)
     life.look()
-    delta = life.rest(0.0, [red])
+    delta = life.rest(0.0, [BALL])
     assert delta.name
     refused = bench.set_parameter('learner', 'teacher')
     assert not refused.successful
@@ -359,3 +369,41 @@ def test_the_belief_is_told_to_who_looks(make_bench, learner):
     assert len(told['pan']) == BELIEF_SAMPLES
     assert told['weight'].sum() == pytest.approx(1.0, abs=1e-5)
     assert np.mean(told['pan']) == pytest.approx(0.1, abs=0.1), 'an untaught belief is about her'
+
+
+def test_glances_are_asked_for_until_both_sides_were_seen(make_life):
+    life = make_life(learner='gaze_line', look_around='both_sides', glance_pan_rad=0.4)
+
+    def glance_at(pan):
+        if pan is None:
+            life.look()
+        else:
+            life.rest(pan)
+        life.bench.wait(lambda: len(life.bench.heard(GLANCE_DELTA)) == life.ms // 100)
+        return list(life.bench.heard(GLANCE_DELTA)[-1].position)
+
+    assert glance_at(None) == pytest.approx([0.4, 0.0])
+    assert glance_at(0.4) == pytest.approx([-0.8, 0.0])
+    assert glance_at(-0.4) == [], 'nothing more to see'
+    assert glance_at(0.1) == [], 'and none after the shift'
+
+
+def test_evidence_is_told_with_every_image_of_the_learner(make_life):
+    life = make_life(learner='gaze_line')
+    life.look()
+    life.rest(0.2)
+    life.bench.wait(lambda: len(life.bench.heard(EVIDENCE)) == 2)
+    stamps = [message.header for message in life.bench.heard(EVIDENCE)]
+    assert stamps == [header(100 * MS), header(200 * MS)]
+    told = [
+        decode_columns(m, ['log_evidence'])['log_evidence'] for m in life.bench.heard(EVIDENCE)
+    ]
+    assert told == [[0.0], [0.0]], 'nothing is known yet'
+
+
+def test_a_trial_that_was_given_up_is_learned_by_who_needs_no_fixation(make_life):
+    life = make_life(learner='gaze_line')
+    life.look()
+    life.rest(0.3, [BALL])
+    life.look()
+    life.bench.wait(lambda: life.learned == 1)

@@ -147,6 +147,7 @@ class LearningModuleNode(GraphNode):
         self._glance_delta.publish(self._joints.encode(header, proposal.glance))
         evidence = {'log_evidence': [proposal.log_evidence]}
         self._evidence.publish(encode_columns(header, evidence))
+        self.health.values['log evidence [nats]'] = f'{proposal.log_evidence:.1f}'
         self._learner.tell()
         if self._belief.get_subscription_count():
             self._tell_belief(header)
