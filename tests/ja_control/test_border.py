@@ -208,6 +208,17 @@ def test_noise_of_the_encoders_does_not_hide_a_stall():
     assert seen == {Cause.STALLED}
 
 
+def test_joint_states_that_come_rarely_are_no_stall():
+    rig = Rig()
+    rig.run(0.1, aim=(0.0, 0.0))
+    rig.joints = False
+    commands = rig.run(0.45, aim=(0.7, 0.0))
+    assert rig.posture[0] - commands[0].position[0] > CONFIG.stall_error_rad
+    assert all(c.hold is None for c in commands), 'heard of for less than stale_after_s'
+    rig.joints = True
+    assert rig.run(0.5, aim=(0.7, 0.0))[-1].position == pytest.approx((0.7, 0.0))
+
+
 def test_latched_fault_waits_for_enable():
     rig = Rig(latch_faults=True)
     rig.run(0.2, aim=(0.5, 0.0))

@@ -280,19 +280,22 @@ class Border:
         return None
 
     def _does_not_follow(self) -> bool:
-        """Has a joint far from its command come no nearer for `stall_after_s`?"""
+        """Has a joint far from its command come no nearer for `stall_after_s`?
+
+        By the times of the measurements: a joint of which nothing is heard is stale, not stalled.
+        """
         if not self._engaged or self._joints is None or self._measured is None:
             return False
         way = np.array([joint.position for joint in self._joints]) - self._measured
         far = np.abs(way) > self.config.stall_error_rad
         if self._follow_from is None:
             self._follow_from = self._measured.copy()
-            self._follow_since_s = np.full(2, self._now_s)
+            self._follow_since_s = np.full(2, self._measured_s)
         came = np.sign(way) * (self._measured - self._follow_from)
         fine = ~far | (came > _PROGRESS_RAD)
         self._follow_from[fine] = self._measured[fine]
-        self._follow_since_s[fine] = self._now_s
-        if np.all(self._now_s - self._follow_since_s <= self.config.stall_after_s):
+        self._follow_since_s[fine] = self._measured_s
+        if np.all(self._measured_s - self._follow_since_s <= self.config.stall_after_s):
             return False
         self._stalled_until_s = self._now_s + self.config.retry_after_s
         return True
