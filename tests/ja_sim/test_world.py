@@ -238,6 +238,16 @@ def test_pictures_are_stamped_with_their_exposure(make_world):
     assert max(ages[10:]) == 100_000_000
 
 
+def test_no_exposure_is_missed_by_steps_that_end_just_before_it(make_world):
+    """Three steps of 1/90 s, in whole nanoseconds, are a little less than 1/30 s."""
+    world = make_world(scene(head={'camera_rate_hz': 30.0}))
+    stamps = set()
+    for _ in range(90):
+        world.step(1 / 90)
+        stamps.add(world.observe().stamp_ns)
+    assert len(stamps) >= 30
+
+
 def test_a_late_picture_shows_the_posture_of_its_stamp(make_world):
     a_scene = scene(head={'camera_rate_hz': 50.0, 'camera_latency_s': 0.2})
     late, prompt = make_world(a_scene), make_world(scene(head={'camera_rate_hz': 50.0}))

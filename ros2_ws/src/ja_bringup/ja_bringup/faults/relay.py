@@ -50,10 +50,10 @@ class Relay(GraphNode):
 
     def _putter(self, topic: Topic) -> Callable[[Any], None]:
         def put(message: Any) -> None:
-            holder, name = (message, 'clock') if topic is CLOCK else (message.header, 'stamp')
+            told = message.clock if topic is CLOCK else message.header.stamp
             # Set back far, the simulated clock would fall below nought, where ROS has no time.
-            stamp_ns = to_ns(getattr(holder, name)) + int(self.clock_ahead_s * NS_PER_S)
-            setattr(holder, name, to_time(max(stamp_ns, 1)))
+            stamp = to_time(max(to_ns(told) + int(self.clock_ahead_s * NS_PER_S), 1))
+            told.sec, told.nanosec = stamp.sec, stamp.nanosec
             self._disturbances[topic].put(message, time.monotonic())
             self._pass_on()
 

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 from ja_common.core.geometry import angle_between, directions_of_vectors
-from ja_experiments.benchmarks.centerface import CenterFace
+from ja_experiments.benchmarks._centerface import CenterFace
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.box import Box
 from ja_perception.core.face_crop import crop_face

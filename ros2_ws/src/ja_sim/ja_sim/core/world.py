@@ -152,10 +152,11 @@ class JointAttentionWorld:
         end_ns = self._now_ns + round(dt * 1e9)
         rate = self.scene.head.camera_rate_hz
         if rate:
-            frame = math.floor((self._now_ns - START_NS) * 1e-9 * rate + 1e-6) + 1
+            frame = math.floor((self._now_ns - START_NS) * 1e-9 * rate)
             while (exposure_ns := START_NS + round(frame / rate * 1e9)) <= end_ns:
-                self._advance_to(exposure_ns)
-                self._film.append(self._view())
+                if exposure_ns > self._now_ns:
+                    self._advance_to(exposure_ns)
+                    self._film.append(self._view())
                 frame += 1
         self._advance_to(end_ns)
         if not rate:
