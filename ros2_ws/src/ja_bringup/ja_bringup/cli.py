@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ja_bringup.bench import benchmarks
+from ja_bringup.calibration.cli import register as register_calibration
 from ja_bringup.examples import show_examples
 from ja_bringup.graph import (
     RECORDER,
@@ -185,6 +186,7 @@ register_experiments(app)
 register_recording(app)
 register_inspection(app)
 register_rig_tools(app)
+register_calibration(app)
 show_examples(app)
 
 

@@ -58,6 +58,11 @@ EXAMPLES: dict[str, dict[str, str]] = {
         './ja soak --time 28800': 'a night',
         './ja soak --time 600 --camera-rate-hz 30 --ros-args -p scene:=easy': 'ten minutes, quick',
     },
+    'calibrate': {
+        './ja calibrate --to head.yaml --ros-args -r image_raw:=/camera/image_raw': 'your camera',
+        './ja calibrate --ros-args -p amplitude_rad:=0.06 -p loops:=4': 'less far, more often',
+        './ja calibrate --ros-args -p use_sim_time:=true': 'of a simulated head',
+    },
     'doctor': {
         './ja doctor': 'what is wrong, and how to mend it',
         "./ja doctor --json | jq '.[] | select(.well | not)'": 'only what is wrong',
