@@ -46,6 +46,7 @@ _VARIED_SIZE, _VARIED_PLACE_PIXELS, _VARIED_LIGHT = 0.1, 1.0, 0.3
 _COMPARED_EVERY_TRIALS = 10
 _BEATEN_BY_NATS = 15.0
 _CLEAR_NATS = 10.0
+_WRONG_NATS = 8.0
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,8 @@ class GazeLineLearner:
             self._network.parameters(), lr=config.step_size, weight_decay=1e-3
         )
         self._annealing = _annealing(config.members)
+        # How much was remembered when each member began to learn.
+        self._began = np.zeros(config.members, int)
         self._memory = ReplayMemory(config.replay_memory)
         # Of each member, and of their mixture.
         self._evidence = Evidence(config.members + 1)
@@ -225,7 +228,8 @@ class GazeLineLearner:
     def _coldness(self) -> torch.Tensor:
         """Of each member, from 0.1, where all candidates count nearly alike, to 1."""
         typical = float(np.mean(self._memory.counts(50)))
-        cooled = len(self._memory) / (self._annealing * max(typical, 1.0) ** 2)
+        lived = np.maximum(len(self._memory) - self._began, 0)
+        cooled = lived / (self._annealing * max(typical, 1.0) ** 2)
         coldness = np.minimum(1.0, _COLDNESS_AT_FIRST + (1 - _COLDNESS_AT_FIRST) * cooled)
         return torch.from_numpy(coldness.astype(np.float32))
 
@@ -235,21 +239,42 @@ class GazeLineLearner:
         self._alarm.reset()
         self._evidence.nats[:] = 0.0
         members = self.config.members
+        self._forget_all(list(range(0, members, 2)))
         self._annealing = _annealing(members)
+        self._began[:] = 0
+        self._optimiser.state.clear()
+        self._steps = 0
+
+    def _forget_all(self, members: list[int]) -> None:
+        """These members begin from nothing, and slowly."""
         seed = int(torch.randint(2**62, (), generator=self._random))
         fresh = _untaught(self.config, seed)
         with torch.no_grad():
             for network in (self._network, self._mean):
                 for old, new in zip(network.parameters(), fresh.parameters(), strict=True):
-                    old.reshape(members, -1)[::2] = new.reshape(members, -1)[::2]
-        self._optimiser.state.clear()
-        self._steps = 0
+                    parts = old.reshape(self.config.members, -1)
+                    parts[members] = new.reshape(self.config.members, -1)[members]
+            for kept in self._optimiser.state.values():
+                for moments in (kept['exp_avg'], kept['exp_avg_sq']):
+                    moments.reshape(self.config.members, -1)[members] = 0.0
+        self._evidence.nats[members] = 0.0
+        self._annealing[members] = _SLOWEST
+        self._began[members] = len(self._memory)
 
     def _replace_the_beaten(self) -> None:
-        """Overwrite the worst member by the best, if the evidence between them is clear."""
+        """Overwrite the worst member by the best, if the evidence between them is clear.
+
+        Where all have evidence against them there is no best: the worst begins from nothing, now
+        that more is remembered, and slowly. If they knew before, the world may have changed: then
+        it is the alarm's turn.
+        """
         nats = self._evidence.nats[:-1]
         best, worst = int(np.argmax(nats)), int(np.argmin(nats))
-        if nats[best] - nats[worst] < _BEATEN_BY_NATS or nats[best] < 0:
+        if nats[best] < 0:
+            if nats[worst] < -_WRONG_NATS and self._alarm.doubt == 0.0:
+                self._forget_all([worst])
+            return
+        if nats[best] - nats[worst] < _BEATEN_BY_NATS:
             return
         with torch.no_grad():
             for network in (self._network, self._mean):
@@ -260,6 +285,7 @@ class GazeLineLearner:
                     give_member(moments, self.config.members, best, worst)
         nats[worst] = nats[best]
         self._annealing[worst] = self._annealing[best]
+        self._began[worst] = self._began[best]
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Everything that learning has changed, the remembered trials too, as named arrays."""
@@ -270,7 +296,7 @@ class GazeLineLearner:
                 arrays[f'optimiser.{name}.{key}'] = value.numpy().copy()
         arrays['random'] = self._random.get_state().numpy()
         arrays['steps'], arrays['trials'] = np.array(self._steps), np.array(self.trials)
-        arrays['annealing'] = self._annealing.copy()
+        arrays['annealing'], arrays['began'] = self._annealing.copy(), self._began.copy()
         arrays['doubt'] = np.array(self._alarm.doubt)
         arrays['doubtful_trials'] = np.array(self._alarm.doubtful_trials)
         return arrays | self._memory.state() | self._evidence.state()
@@ -290,6 +316,7 @@ class GazeLineLearner:
             evidence.restore(arrays)
             steps, trials = int(arrays['steps']), int(arrays['trials'])
             doubt, doubtful = float(arrays['doubt']), int(arrays['doubtful_trials'])
+            began = arrays['began'].reshape(self.config.members).astype(int)
             annealing = arrays['annealing'].reshape(self.config.members).copy()
             random = torch.Generator()
             random.set_state(torch.from_numpy(arrays['random'].copy()))
@@ -305,7 +332,8 @@ class GazeLineLearner:
                 self._optimiser.state[p] = {
                     k: torch.from_numpy(np.array(v)) for k, v in kept.items()
                 }
-        self._steps, self.trials, self._annealing = steps, trials, annealing
+        self._steps, self.trials = steps, trials
+        self._annealing, self._began = annealing, began
         self._alarm.doubt, self._alarm.doubtful_trials = doubt, doubtful
 
 
