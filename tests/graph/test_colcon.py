@@ -46,9 +46,7 @@ def test_a_node_of_the_built_workspace_runs(tmp_path, ros_context):
         cwd=tmp_path, env=environ, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:
-        spin_until(
-            executor, lambda: ('gate', '/built') in watcher.get_node_names_and_namespaces()
-        )
+        spin_until(executor, lambda: ('gate', '/built') in watcher.get_node_names_and_namespaces())
     finally:
         gate.send_signal(signal.SIGINT)
         errors = gate.communicate(timeout=10)[1]

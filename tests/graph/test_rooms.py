@@ -58,9 +58,7 @@ def test_core_is_free_of_ros(package):
     for path, name in imports_of(package):
         top, *rest = name.split('.')
         if 'core' in path.parts and (
-            top == 'rclpy'
-            or top.endswith('_msgs')
-            or (top in OURS and rest and rest[0] != 'core')
+            top == 'rclpy' or top.endswith('_msgs') or (top in OURS and rest and rest[0] != 'core')
         ):
             wrong.append((path, name))
     assert not wrong

@@ -20,9 +20,7 @@ CHROMIUM, DRIVER = shutil.which('chromium'), shutil.which('chromedriver')
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(
-        not (CHROMIUM and DRIVER), reason='needs chromium and chromium-driver'
-    ),
+    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason='needs chromium and chromium-driver'),
 ]
 
 # Name, width and height [px], and whether it is a phone.

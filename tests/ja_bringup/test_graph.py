@@ -44,9 +44,7 @@ def test_the_user_wins_over_the_preset(ros_context: Context, tmp_path: Path):
         '/**/other:\n  ros__parameters: {a: 9}\n'
     )
     theirs = tmp_path / 'mine.yaml'
-    theirs.write_text(
-        '/**:\n  ros__parameters: {b: 3}\n/**/t:\n  ros__parameters: {c: 3}\n'
-    )
+    theirs.write_text('/**:\n  ros__parameters: {b: 3}\n/**/t:\n  ros__parameters: {c: 3}\n')
     spec = NodeSpec('p', 't', preset(ours, 't'), {'chatter': 'talk'})
     user = ['--params-file', str(theirs), '-p', 'd:=3', '-r', '__ns:=/robot']
     [spec] = with_arguments([spec], user)

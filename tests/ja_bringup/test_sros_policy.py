@@ -41,8 +41,11 @@ def test_the_policy_is_what_the_graph_itself_tells_of_every_node():
             # /clock is heard where use_sim_time is on.
             spare = allowed(policy, name, 'topics', 'subscribe') - heard
             assert spare <= BY_CONFIGURATION | {'clock', 'parameter_events'}
-        commanders = [n.get_name() for n in nodes
-                      if 'joint_commands' in allowed(policy, n.get_name(), 'topics', 'publish')]
+        commanders = [
+            n.get_name()
+            for n in nodes
+            if 'joint_commands' in allowed(policy, n.get_name(), 'topics', 'publish')
+        ]
         assert commanders == ['gate'], 'it alone commands the head'
         deaf = ('gate', 'learning_module', 'internal_evaluator', 'salient_feature_detector')
         for name in deaf:

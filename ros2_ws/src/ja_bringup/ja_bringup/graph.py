@@ -177,6 +177,5 @@ def _mind(seed: int) -> list[NodeSpec]:
 def _configured(path: Path, graph: Sequence[NodeSpec]) -> list[NodeSpec]:
     """The graph with a preset below the parameters that it has already."""
     return [
-        replace(node, parameters={**preset(path, node.thing), **node.parameters})
-        for node in graph
+        replace(node, parameters={**preset(path, node.thing), **node.parameters}) for node in graph
     ]

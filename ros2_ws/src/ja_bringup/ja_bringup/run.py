@@ -77,9 +77,7 @@ def run_graph(
 
     def make_watcher(context: Context) -> ProgressNode:
         cli = ['--ros-args', *arguments] if arguments else []
-        watcher.append(
-            ProgressNode(context=context, cli_args=cli, use_global_arguments=False)
-        )
+        watcher.append(ProgressNode(context=context, cli_args=cli, use_global_arguments=False))
         return watcher[0]
 
     with Display(title) as display, ExitStack() as beside:

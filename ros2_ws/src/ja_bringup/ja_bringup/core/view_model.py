@@ -221,9 +221,7 @@ class ViewModel:
         recent = self.curve.rate(slice(-WINDOW_TRIALS, None))
         if recent.trials:
             low, high = recent.interval
-            facts[f'success, last {recent.trials}'] = (
-                f'{recent.rate:.2f} [{low:.2f}, {high:.2f}]'
-            )
+            facts[f'success, last {recent.trials}'] = f'{recent.rate:.2f} [{low:.2f}, {high:.2f}]'
         trials = sum(self.fixations.values())
         for source, count in sorted(self.fixations.items()):
             name = 'given up' if source == 'none' else f'fixated by {source}'

@@ -259,7 +259,10 @@ def _chart_options() -> dict[str, Any]:
         'legend': {'top': 0, 'data': ['success', 'p(LM)'], 'textStyle': {'color': '#94a3b8'}},
         'xAxis': {'type': 'value', 'max': 'dataMax', 'splitLine': {'show': False}},
         'yAxis': {
-            'type': 'value', 'min': 0, 'max': 1, 'splitLine': {'lineStyle': {'color': '#334155'}},
+            'type': 'value',
+            'min': 0,
+            'max': 1,
+            'splitLine': {'lineStyle': {'color': '#334155'}},
         },
         'tooltip': {'trigger': 'axis'},
         'series': [

@@ -26,9 +26,7 @@ class Server(threading.Thread):
         shown = '127.0.0.1' if host == '0.0.0.0' else host
         self.address = f'http://{shown}:{self._socket.getsockname()[1]}'
         self._server = uvicorn.Server(
-            uvicorn.Config(
-                web_app(robot), log_level='warning', timeout_graceful_shutdown=_GRACE_S
-            )
+            uvicorn.Config(web_app(robot), log_level='warning', timeout_graceful_shutdown=_GRACE_S)
         )
 
     def __enter__(self) -> 'Server':
