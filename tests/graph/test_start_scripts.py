@@ -34,8 +34,9 @@ def processes_of(parent: int) -> list[int]:
 
 
 def named(pids: list[int]) -> dict[str, int]:
-    """Process ids by the module of their node."""
-    return {Path(f'/proc/{pid}/cmdline').read_text().split('\0')[3]: pid for pid in pids}
+    """Process ids by the module of their node; one that just begins or ends has no name."""
+    commands = {pid: Path(f'/proc/{pid}/cmdline').read_text().split('\0') for pid in pids}
+    return {command[3]: pid for pid, command in commands.items() if len(command) > 3}
 
 
 def logs(folder: Path) -> str:
@@ -94,7 +95,9 @@ def trials_learned(run: Path) -> int:
 def wait_for_log(folder: Path, process: subprocess.Popen, timeout_s: float = 30.0) -> list[int]:
     """Until every node of the graph runs as a process; their ids."""
     end = time.monotonic() + timeout_s
-    while len(list(folder.glob('runs/*/log/*.log'))) < 7:
+    while (
+        len(list(folder.glob('runs/*/log/*.log'))) < 7 or len(named(processes_of(process.pid))) < 7
+    ):
         assert process.poll() is None, process.communicate()[0]
         assert time.monotonic() < end
         time.sleep(0.05)
