@@ -21,6 +21,7 @@ from rclpy.serialization import deserialize_message
 
 from ja_bringup.recording.message_types import message_class
 from ja_bringup.recording.reader import Recording
+from ja_bringup.status_values import status_values
 from ja_common.core.detection import Detection, Kind
 from ja_common.core.fixation import WIDTH_SIXTH
 from ja_common.core.geometry import angle_between, rays_of_directions
@@ -88,7 +89,7 @@ def moments(recording: Recording) -> Iterator[Moment]:
         kept[name] = said
         if name != GATE_STATUS.name or any(topic.name not in kept for topic in answered):
             continue
-        values = {entry.key: entry.value for entry in said.values}
+        values = status_values(said)
         image = kept[IMAGE.name]
         if 'source' not in values or to_ns(image.header.stamp) == shown_ns:
             continue

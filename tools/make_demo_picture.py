@@ -1,6 +1,6 @@
 """Makes docs/images/demo.png: what the robot sees, beside the success curve of a demo.
 
-.venv/bin/python tools/make_demo_picture.py runs/<time>-demo/success_curve.png
+    .venv/bin/python tools/make_demo_picture.py runs/<time>-demo/success_curve.png
 """
 
 import sys

@@ -42,11 +42,7 @@ class NodeSpec:
 
     def ros_arguments(self) -> list[str]:
         """The node's arguments, from `--ros-args` on."""
-        arguments = ['--ros-args']
-        for name, value in self.parameters.items():
-            # YAML's flow style is what rcl reads after `:=`.
-            text = yaml.safe_dump(value, default_flow_style=True, width=10**6)
-            arguments += ['-p', f'{name}:={text.removesuffix("...").strip()}']
+        arguments = ['--ros-args', *parameter_arguments(self.parameters)]
         for old, new in self.remappings.items():
             arguments += ['-r', f'{old}:={new}']
         return [*arguments, *self.arguments]
@@ -62,6 +58,16 @@ class NodeSpec:
 
 RECORDER = NodeSpec('ja_bringup', 'recorder')
 """Stands first in a graph that is recorded, so that it misses nothing."""
+
+
+def parameter_arguments(parameters: Mapping[str, Any]) -> list[str]:
+    """Parameters as ROS arguments: `-p NAME:=VALUE`, one after the other."""
+    arguments: list[str] = []
+    for name, value in parameters.items():
+        # YAML's flow style is what rcl reads after `:=`.
+        text = yaml.safe_dump(value, default_flow_style=True, width=10**6)
+        arguments += ['-p', f'{name}:={text.strip().removesuffix("...").strip()}']
+    return arguments
 
 
 def split_ros_arguments(argv: Sequence[str]) -> tuple[list[str], list[str]]:

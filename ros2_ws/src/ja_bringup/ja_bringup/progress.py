@@ -14,6 +14,7 @@ from rich.live import Live
 from rich.table import Table
 
 from ja_bringup.core.learning_curve import LearningCurve
+from ja_bringup.status_values import status_values
 from ja_common.graph_node import GraphNode
 from ja_common.topics import DIAGNOSTICS, GATE_STATUS, SCORE
 from ja_sim.core.score import Rate
@@ -60,12 +61,12 @@ class ProgressNode(GraphNode):
         now = time.monotonic()
         if math.isnan(self.began_s):
             self.began_s = now
-        self.gate = _values(message)
+        self.gate = status_values(message)
         self.images += 1
         self._image_times_s.append(now)
 
     def _on_score(self, message: DiagnosticStatus) -> None:
-        values = _values(message)
+        values = status_values(message)
         success = values.get('last') == 'success'
         self.objects = int(values.get('objects', '1'))
         self.curve.add(success, float(self.gate.get('p_lm', 'nan')), self.elapsed_s)
@@ -138,7 +139,3 @@ def rate_text(rate: Rate) -> str:
         return 'no trials'
     low, high = rate.interval
     return f'{rate.rate:.2f} [{low:.2f}, {high:.2f}] of {rate.trials}'
-
-
-def _values(message: DiagnosticStatus) -> dict[str, str]:
-    return {pair.key: pair.value for pair in message.values}

@@ -64,19 +64,19 @@ def soak(
     from rich.console import Console
     from rich.table import Table
 
-    from ja_bringup.graph import sim_graph, with_arguments
+    from ja_bringup.graph import parameter_arguments, sim_graph, with_arguments
     from ja_bringup.run import new_run_folder
     from ja_bringup.soak import COLUMNS, Soak
 
     folder = new_run_folder('soak').absolute()
     settings = {
-        'lockstep': 'false',
-        'camera_rate_hz': str(camera_rate_hz),
+        'lockstep': False,
+        'camera_rate_hz': camera_rate_hz,
         'checkpoint_folder': str(folder / 'checkpoints'),
         'trials_file': str(folder / 'trials'),
     }
-    arguments = [part for item in settings.items() for part in ('-p', ':='.join(item))]
-    run = Soak(with_arguments(sim_graph(), [*arguments, *(context.obj or [])]), folder, typer.echo)
+    arguments = [*parameter_arguments(settings), *(context.obj or [])]
+    run = Soak(with_arguments(sim_graph(), arguments), folder, typer.echo)
     code = run.run(time_s)
     table = Table(*COLUMNS, box=box.MARKDOWN)
     for series in run.series():

@@ -13,11 +13,11 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as implemen
 from ja_bringup.companion import Companion
 from ja_bringup.graph import NodeSpec
 from ja_bringup.one_process import run_in_one_process
+from ja_bringup.own_executor import own_executor
 from ja_bringup.progress import Display, ProgressNode
 from ja_bringup.supervisor import OnDeath, Supervisor
 from ja_bringup.view import LIVE_PAGE
 from ja_common.core.config import ConfigError
-from ja_common.executor import KeptWaitSetExecutor
 from ja_common.ros_defaults import apply_ros_defaults
 
 # The learner and the gate are kept side by side, so that they are of the same age when they go on.
@@ -121,19 +121,11 @@ def _run_processes(
     on_death: OnDeath,
     say: Callable[[str], None],
 ) -> int:
-    context = Context()
-    rclpy.init(args=[], context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-    executor = KeptWaitSetExecutor(context=context)
-    node = make_watcher(context)
-    executor.add_node(node)
+    with own_executor() as executor:
+        executor.add_node(make_watcher(executor.context))
 
-    def tick() -> bool:
-        executor.spin_once(timeout_sec=0.1)
-        return is_done()
+        def tick() -> bool:
+            executor.spin_once(timeout_sec=0.1)
+            return is_done()
 
-    try:
         return Supervisor(graph, folder / 'log', on_death, say).run(tick)
-    finally:
-        executor.shutdown()
-        node.destroy_node()
-        context.try_shutdown()

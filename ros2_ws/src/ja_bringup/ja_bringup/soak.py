@@ -12,13 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 
 from ja_bringup.graph import NodeSpec
+from ja_bringup.own_executor import own_executor
 from ja_bringup.supervisor import Supervisor
-from ja_common.executor import KeptWaitSetExecutor
 from ja_common.graph_node import GraphNode
 from ja_common.topics import DIAGNOSTICS
 
@@ -79,26 +78,19 @@ class Soak:
 
     def run(self, seconds: float) -> int:
         """The exit code of the graph; the figures are in `series` afterwards."""
-        context = Context()
-        rclpy.init(args=[], context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-        executor = KeptWaitSetExecutor(context=context)
-        rates = Rates(context)
-        executor.add_node(rates)
-        end_s = time.monotonic() + seconds
+        with own_executor() as executor:
+            rates = Rates(executor.context)
+            executor.add_node(rates)
+            end_s = time.monotonic() + seconds
 
-        def tick() -> bool:
-            executor.spin_once(timeout_sec=0.1)
-            now_s = time.monotonic()
-            if now_s - self._sampled_s >= _SAMPLE_EVERY_S:
-                self._sample(now_s, rates)
-            return now_s >= end_s
+            def tick() -> bool:
+                executor.spin_once(timeout_sec=0.1)
+                now_s = time.monotonic()
+                if now_s - self._sampled_s >= _SAMPLE_EVERY_S:
+                    self._sample(now_s, rates)
+                return now_s >= end_s
 
-        try:
             return self._supervisor.run(tick)
-        finally:
-            executor.shutdown()
-            rates.destroy_node()
-            context.try_shutdown()
 
     def series(self) -> list[Series]:
         """All figures, by what they are of."""

@@ -22,6 +22,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from ja_bringup.core.view_model import CurvePoints, Glance, Light, State, ViewModel
 from ja_bringup.progress import EVERY_SCORE
+from ja_bringup.status_values import status_values
 from ja_bringup.view import LIVE_PAGE
 from ja_bringup.view.mailbox import Mailbox
 from ja_bringup.view.sight import ALL_OF_ONE_LOOK, LIMITS, Picture, Sight
@@ -152,7 +153,7 @@ class ViewNode(GraphNode):
         if any(message.name for message, _ in fixations):
             self._model.hear_fixation()
         for message, _ in self._statuses.take():
-            self._model.hear_gate(_values(message))
+            self._model.hear_gate(status_values(message))
         if self._sight is not None:
             if self._limits is not None:
                 self._sight.limits = self._limits
@@ -189,12 +190,13 @@ class ViewNode(GraphNode):
         )
 
     def _on_score(self, message: DiagnosticStatus) -> None:
-        self._model.hear_score(_values(message).get('last') == 'success', time.monotonic())
+        self._model.hear_score(status_values(message).get('last') == 'success', time.monotonic())
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             level = Level(int.from_bytes(status.level, 'little'))
-            light = Light(status.name, level, status.message, time.monotonic(), _values(status))
+            values = status_values(status)
+            light = Light(status.name, level, status.message, time.monotonic(), values)
             self._model.hear_health(light)
 
     def _on_log(self, message: Log) -> None:
@@ -256,10 +258,6 @@ class ViewNode(GraphNode):
         for descriptor in future.result().descriptors:
             if choices := choices_of(descriptor):
                 self._choices[name] = choices
-
-
-def _values(status: DiagnosticStatus) -> dict[str, str]:
-    return {pair.key: pair.value for pair in status.values}
 
 
 def main(args: list[str] | None = None) -> None:

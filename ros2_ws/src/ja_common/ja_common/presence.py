@@ -41,4 +41,5 @@ class Presence:
 
     def _introduce(self) -> None:
         node = self._node
-        node.destroy_publisher(node.create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, 1))
+        publisher = node.create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.says)
+        node.destroy_publisher(publisher)

@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ja_common.core.detection import most_salient, objects
+from ja_common.core.detection import most_salient
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_common.core.stamps import NS_PER_S
 from ja_control.core.visual_feedback import visual_feedback
-from ja_experiments.robot import Learner
-from ja_learning.core.evaluator import EvaluatorConfig, InternalEvaluator
-from ja_learning.core.learning_module import LearningModule
+from ja_experiments.robot import Learner, Pupil
+from ja_learning.core.evaluator import EvaluatorConfig
 from ja_learning.core.look_around import LookAroundConfig
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.camera_model import CameraModel
@@ -28,12 +27,10 @@ class GymAgent:
 
     def __init__(self, learner: Learner, p_lm: float, seed: int) -> None:
         self.p_lm = p_lm
-        self._learner = learner
         self._rng = np.random.default_rng(seed)
         self._detector = SalientFeatureDetector(BlazeFace())
-        self._evaluator = InternalEvaluator(EvaluatorConfig())
-        self._module = LearningModule(
-            lambda: learner, LookAroundConfig(), STILL_BELOW_RAD_S, seed=seed
+        self._pupil = Pupil(
+            learner, LookAroundConfig(), EvaluatorConfig(), STILL_BELOW_RAD_S, seed
         )
         self._stamp_ns = 0
 
@@ -45,14 +42,7 @@ class GymAgent:
         image = observation['image']
         camera = CameraModel(image.shape[1], image.shape[0], *info['camera'])
         percept = self._detector.look(image, self._stamp_ns, camera, posture)
-        rays = np.reshape([seen.ray for seen in objects(percept.detections)], (-1, 2))
-        proposal = self._module.see(posture, rays, percept.face_image)
-        if proposal.given_up is not None:
-            self._learner.learn(proposal.given_up)
-        fixation = self._evaluator.fixation(percept.detections, posture)
-        trial = None if fixation is None else self._module.fixate(posture, fixation)
-        if trial is not None:
-            self._learner.learn(trial)
+        proposal, _ = self._pupil.live(percept.detections, percept.face_image, posture)
         if proposal.delta is not None and self._rng.random() < self.p_lm:
             return proposal.delta
         salient = most_salient(percept.detections)

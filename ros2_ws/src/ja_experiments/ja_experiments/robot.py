@@ -15,9 +15,10 @@ from ja_control.core.gating import Gating
 from ja_control.core.joint_limits import JointLimits
 from ja_control.core.visual_feedback import visual_feedback
 from ja_experiments.config import ExperimentConfig
-from ja_learning.core.evaluator import InternalEvaluator
+from ja_learning.core.evaluator import EvaluatorConfig, InternalEvaluator
 from ja_learning.core.learner import Predictor
-from ja_learning.core.learning_module import LearningModule
+from ja_learning.core.learning_module import LearningModule, Proposal
+from ja_learning.core.look_around import LookAroundConfig
 from ja_learning.core.trial import Trial
 
 
@@ -55,6 +56,43 @@ class FixedTurn:
         pass
 
 
+class Pupil:
+    """A learner that lives: asked on every image, and taught the trials that it makes of them.
+
+    `taught`: as in `TaskConfig`.
+    """
+
+    def __init__(
+        self,
+        learner: Learner,
+        look_around: LookAroundConfig,
+        evaluator: EvaluatorConfig,
+        still_below_rad_s: float,
+        seed: int,
+        taught: str = 'fixation',
+    ) -> None:
+        self._learner = learner
+        self._evaluator = InternalEvaluator(evaluator)
+        self._module = LearningModule(lambda: learner, look_around, still_below_rad_s, seed)
+        self._taught = taught
+
+    def live(
+        self, detections: list[Detection], face: NDArray[np.uint8] | None, posture: Posture
+    ) -> tuple[Proposal, NDArray[np.float64] | None]:
+        """One image: what the learner proposes, and the direction (2,) [rad] that is fixated."""
+        rays = [seen.ray for seen in objects(detections)]
+        proposal = self._module.see(posture, np.reshape(rays, (-1, 2)), face)
+        fixation = self._evaluator.fixation(detections, posture)
+        if proposal.given_up is not None:
+            self._learner.learn(proposal.given_up)
+        trial = None if fixation is None else self._module.fixate(posture, fixation)
+        if trial is not None:
+            if self._taught == 'executed':
+                trial = replace(trial, fixation=posture.position)
+            self._learner.learn(trial)
+        return proposal, fixation
+
+
 @dataclass(frozen=True)
 class Step:
     """What the robot made of one image.
@@ -75,22 +113,23 @@ class Robot:
     def __init__(
         self, config: ExperimentConfig, learner: Learner, rng: np.random.Generator
     ) -> None:
-        self._learner = learner
         self._config = config
         self._cycle = AttentionCycle(config.cycle, Gating(config.gating), rng)
-        self._evaluator = InternalEvaluator(config.evaluator)
         self._limits = JointLimits(config.limits)
-        self._module = LearningModule(
-            lambda: learner, config.look_around, config.cycle.still_below_rad_s, seed=0
+        self._pupil = Pupil(
+            learner,
+            config.look_around,
+            config.evaluator,
+            config.cycle.still_below_rad_s,
+            seed=0,
+            taught=config.task.taught,
         )
 
     def step(
         self, detections: list[Detection], face: NDArray[np.uint8] | None, posture: Posture
     ) -> Step:
         """One image, as detections and the picture of the attended `face`, uint8 (30, 25)."""
-        rays = [seen.ray for seen in objects(detections)]
-        proposal = self._module.see(posture, np.reshape(rays, (-1, 2)), face)
-        fixation = self._evaluator.fixation(detections, posture)
+        proposal, fixation = self._pupil.live(detections, face, posture)
         percept = Percept(
             posture,
             face_delta=self._feedback(caregiver_face(detections)),
@@ -100,21 +139,9 @@ class Robot:
             fixation=fixation,
             log_evidence=proposal.log_evidence,
         )
-        if proposal.given_up is not None:
-            self._learner.learn(proposal.given_up)
-        if fixation is not None:
-            self._learn(fixation, posture)
         decision = self._cycle.step(percept)
         return Step(self._limits.clip(decision.target), decision, fixation, proposal.delta)
 
     def _feedback(self, seen: Detection | None) -> NDArray[np.float64] | None:
         gain = self._config.visual_feedback.gain
         return None if seen is None else visual_feedback(seen.ray, gain)
-
-    def _learn(self, fixation: NDArray[np.float64], posture: Posture) -> None:
-        trial = self._module.fixate(posture, fixation)
-        if trial is None:
-            return
-        if self._config.task.taught == 'executed':
-            trial = replace(trial, fixation=posture.position)
-        self._learner.learn(trial)

@@ -13,22 +13,21 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from numpy.typing import NDArray
-from rclpy.context import Context
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from ja_bringup.bench import Row
 from ja_bringup.benchmarks._rows import percentile_99, row
 from ja_bringup.graph import NodeSpec
+from ja_bringup.own_executor import own_executor
+from ja_bringup.status_values import status_values
 from ja_bringup.supervisor import Supervisor
 from ja_common.core.config import ConfigError
 from ja_common.core.detection import Detection, Kind
 from ja_common.core.stamps import NS_PER_S
 from ja_common.detection_codec import encode_detections
-from ja_common.executor import KeptWaitSetExecutor
 from ja_common.graph_node import GraphNode
 from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
@@ -68,28 +67,20 @@ def run() -> dict[str, Row]:
 
 
 def _measure(parameters: dict[str, Any]) -> '_Watch':
-    context = Context()
-    rclpy.init(args=[], context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-    watch = _Watch(context=context)
-    executor = KeptWaitSetExecutor(context=context)
-    executor.add_node(watch)
-    story = watch.story()
+    with own_executor() as executor, TemporaryDirectory() as folder:
+        watch = _Watch(context=executor.context)
+        executor.add_node(watch)
+        story = watch.story()
 
-    def tick() -> bool:
-        executor.spin_once(timeout_sec=0.005)
-        return next(story, 'over') == 'over'
+        def tick() -> bool:
+            executor.spin_once(timeout_sec=0.005)
+            return next(story, 'over') == 'over'
 
-    try:
-        with TemporaryDirectory() as folder:
-            kept = {'learner': 'gaze_line', 'checkpoint_folder': f'{folder}/checkpoints'}
-            learner = NodeSpec('ja_learning', 'learning_module', {**kept, **parameters})
-            if Supervisor([learner], Path(folder) / 'log').run(tick):
-                raise ConfigError('the learning module did not run to the end of the measurement')
-    finally:
-        executor.shutdown()
-        watch.destroy_node()
-        context.try_shutdown()
-    return watch
+        kept = {'learner': 'gaze_line', 'checkpoint_folder': f'{folder}/checkpoints'}
+        learner = NodeSpec('ja_learning', 'learning_module', {**kept, **parameters})
+        if Supervisor([learner], Path(folder) / 'log').run(tick):
+            raise ConfigError('the learning module did not run to the end of the measurement')
+        return watch
 
 
 class _Watch(GraphNode):
@@ -153,9 +144,10 @@ class _Watch(GraphNode):
         self._answered = to_ns(message.header.stamp), time.perf_counter()
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
-        values = {pair.key: pair.value for status in message.status for pair in status.values}
-        self.trials = int(values.get('trials learned', self.trials))
-        self.waiting = int(values.get('of these still waiting', self.waiting))
+        for status in message.status:
+            values = status_values(status)
+            self.trials = int(values.get('trials learned', self.trials))
+            self.waiting = int(values.get('of these still waiting', self.waiting))
 
 
 def _detection(kind: Kind, ray: NDArray[np.float64]) -> Detection:

@@ -23,7 +23,7 @@ from ja_bringup.bench import Row
 from ja_bringup.benchmarks._rows import percentile_99, row
 from ja_bringup.benchmarks.graph import WARM_UP_S, run_for_benchmark
 from ja_bringup.companion import Companion
-from ja_bringup.graph import sim_graph, with_arguments
+from ja_bringup.graph import parameter_arguments, sim_graph, with_arguments
 from ja_bringup.progress import ProgressNode
 from ja_common.core.stamps import NS_PER_S
 from ja_common.time_codec import to_ns
@@ -39,7 +39,7 @@ from ja_common.topics import (
 
 MEASURE_S = 20.0
 CAMERA = {
-    'lockstep': 'false', 'camera_rate_hz': '30.0', 'image_width': '640', 'image_height': '480',
+    'lockstep': False, 'camera_rate_hz': 30.0, 'image_width': 640, 'image_height': 480,
 }  # fmt: skip
 # In the order in which the messages of one picture are made.
 HOPS = (DETECTIONS, VF_DELTA, LM_DELTA, FIXATION, JOINT_COMMANDS)
@@ -48,8 +48,7 @@ HOPS = (DETECTIONS, VF_DELTA, LM_DELTA, FIXATION, JOINT_COMMANDS)
 def run() -> dict[str, Row]:
     """In both compositions: median and 99th percentile from the picture to each topic."""
     rows: dict[str, Row] = {}
-    arguments = [part for item in CAMERA.items() for part in ('-p', ':='.join(item))]
-    graph = with_arguments(sim_graph(), arguments)
+    graph = with_arguments(sim_graph(), parameter_arguments(CAMERA))
     head = [spec for spec in graph if spec.package == 'ja_sim']
     mind = [spec for spec in graph if spec not in head]
     for name, one_process in (('many processes', False), ('one process', True)):

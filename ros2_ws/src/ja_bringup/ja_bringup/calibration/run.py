@@ -4,11 +4,9 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import rclpy
-from rclpy.context import Context
-
 from ja_bringup.calibration.file import as_dict
 from ja_bringup.calibration.rig import CalibrationRig
+from ja_bringup.own_executor import own_executor
 from ja_common.executor import KeptWaitSetExecutor
 
 _BRAKING_S = 3.0
@@ -21,24 +19,18 @@ def run_calibration(
 
     Raises ValueError where head or picture allow none, and KeyboardInterrupt when the head stands.
     """
-    context = Context()
-    cli = ['--ros-args', *arguments] if arguments else []
-    # Ctrl-C must not end the context: the head is still to be braked.
-    rclpy.init(args=cli, context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-    rig = CalibrationRig(context=context)
-    executor = KeptWaitSetExecutor(context=context)
-    executor.add_node(rig)
-    try:
-        _spin_until_found(rig, executor, patience_s, say)
-        assert rig.conductor is not None
-        assert rig.conductor.found is not None
-        pan, tilt = (bool(sign < 0) for sign in rig.joints.signs)
-        return as_dict(rig.conductor.found, (pan, tilt), rig.image_size)
-    finally:
-        _brake(rig, executor)
-        executor.shutdown()
-        rig.destroy_node()
-        context.try_shutdown()
+    # Ctrl-C does not end the context: the head is still to be braked.
+    with own_executor(arguments) as executor:
+        rig = CalibrationRig(context=executor.context)
+        executor.add_node(rig)
+        try:
+            _spin_until_found(rig, executor, patience_s, say)
+            assert rig.conductor is not None
+            assert rig.conductor.found is not None
+            pan, tilt = (bool(sign < 0) for sign in rig.joints.signs)
+            return as_dict(rig.conductor.found, (pan, tilt), rig.image_size)
+        finally:
+            _brake(rig, executor)
 
 
 def _spin_until_found(

@@ -5,23 +5,19 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import rclpy
-from rclpy.context import Context
-
 from ja_bringup.faults.catalogue import Fault, Graph, faults
 from ja_bringup.faults.relay import AROUND, Relay
 from ja_bringup.faults.watcher import Watcher
-from ja_bringup.graph import NodeSpec, sim_graph, with_arguments
+from ja_bringup.graph import NodeSpec, parameter_arguments, sim_graph, with_arguments
+from ja_bringup.own_executor import own_executor
 from ja_bringup.supervisor import Supervisor
-from ja_common.executor import KeptWaitSetExecutor
 
 # A rig's limits in front of a camera of 30 images/s, small so that two cores keep up.
 RIG = {
-    'lockstep': 'false', 'camera_rate_hz': '30.0', 'joint_states_per_image': '3',
-    'image_width': '160', 'image_height': '120',
-    'hold_after_s': '0.13', 'max_speed_rad_s': '2.0', 'max_acceleration_rad_s2': '40.0',
-    'trials_file': '{folder}/trials', 'checkpoint_folder': '{folder}/checkpoints',
-    'checkpoint_every_trials': '1',
+    'lockstep': False, 'camera_rate_hz': 30.0, 'joint_states_per_image': 3,
+    'image_width': 160, 'image_height': 120,
+    'hold_after_s': 0.13, 'max_speed_rad_s': 2.0, 'max_acceleration_rad_s2': 40.0,
+    'checkpoint_every_trials': 1,
 }  # fmt: skip
 COLUMNS = (
     'fault', 'stopped [s]', 'pause [s]', 'resumed [s]', 'trials lost', 'lessons lost', 'verdict'
@@ -84,8 +80,8 @@ class FaultRun:
         place: Callable[[list[NodeSpec]], list[NodeSpec]] = list,
     ) -> None:
         """`place` says where else the nodes run than here."""
-        settings = {name: text.format(folder=folder) for name, text in RIG.items()}
-        arguments = [part for item in settings.items() for part in ('-p', ':='.join(item))]
+        kept = {'trials_file': f'{folder}/trials', 'checkpoint_folder': f'{folder}/checkpoints'}
+        arguments = parameter_arguments({**RIG, **kept})
         graph = [
             replace(spec, remappings={**spec.remappings, **AROUND})
             if spec.thing == 'sim'
@@ -103,27 +99,20 @@ class FaultRun:
 
     def run(self, chosen: Sequence[Fault]) -> int:
         """These faults in turn; the exit code of the graph."""
-        context = Context()
-        rclpy.init(args=[], context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-        executor = KeptWaitSetExecutor(context=context)
-        watcher, relay = Watcher(context=context), Relay(context=context)
-        executor.add_node(watcher)
-        executor.add_node(relay)
-        story = self._story(chosen, watcher, Graph(lambda: self._supervisor.pids, relay))
+        with own_executor() as executor:
+            watcher = Watcher(context=executor.context)
+            relay = Relay(context=executor.context)
+            executor.add_node(watcher)
+            executor.add_node(relay)
+            story = self._story(chosen, watcher, Graph(lambda: self._supervisor.pids, relay))
 
-        def tick() -> bool:
-            end_s = time.monotonic() + 0.02
-            while time.monotonic() < end_s:
-                executor.spin_once(timeout_sec=0.005)
-            return next(story, 'over') == 'over'
+            def tick() -> bool:
+                end_s = time.monotonic() + 0.02
+                while time.monotonic() < end_s:
+                    executor.spin_once(timeout_sec=0.005)
+                return next(story, 'over') == 'over'
 
-        try:
             return self._supervisor.run(tick)
-        finally:
-            executor.shutdown()
-            watcher.destroy_node()
-            relay.destroy_node()
-            context.try_shutdown()
 
     def _story(self, chosen: Sequence[Fault], watcher: Watcher, graph: Graph) -> Iterator[str]:
         yield from _wait(lambda: watcher.learned >= _TRIALS_BEFORE)

@@ -7,6 +7,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from sensor_msgs.msg import JointState
 
+from ja_bringup.status_values import status_values
 from ja_common.graph_node import GraphNode
 from ja_common.topics import DIAGNOSTICS, GATE_STATUS, JOINT_COMMANDS
 
@@ -43,7 +44,7 @@ class Watcher(GraphNode):
         self._position = position
 
     def _on_status(self, message: DiagnosticStatus) -> None:
-        values = {pair.key: pair.value for pair in message.values}
+        values = status_values(message)
         self.trials = int(values.get('trials', '0'))
         if 'source' in values:
             now_s = time.monotonic()
@@ -54,6 +55,6 @@ class Watcher(GraphNode):
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            values = {pair.key: pair.value for pair in status.values}
+            values = status_values(status)
             if 'trials learned' in values:
                 self.learned = int(values['trials learned'])

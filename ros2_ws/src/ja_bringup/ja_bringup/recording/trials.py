@@ -13,6 +13,7 @@ from ja_bringup.graph import NodeSpec
 from ja_bringup.recording.drive import DrivenNode, driven
 from ja_bringup.recording.message_types import message_class
 from ja_bringup.recording.reader import RecordedMessage, Recording
+from ja_bringup.status_values import status_values
 from ja_common.core.config import ConfigError
 from ja_common.core.detection import caregiver_face
 from ja_common.core.geometry import angle_between
@@ -115,7 +116,7 @@ class _Witness:
         if topic == SIM_TRUTH.name:
             self._truths.append(decode_truth(decoded))
         elif topic == GATE_STATUS.name:
-            said = {entry.key: entry.value for entry in decoded.values}
+            said = status_values(decoded)
             self._source = said['source'] if said.get('source') in _SHIFTS else self._source
         elif topic == DETECTIONS.name:
             face = caregiver_face(decode_detections(decoded))

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from ja_experiments.benchmarks._rows import success_row
 from ja_experiments.config import ExperimentConfig
-from ja_experiments.estimate import over_seeds
 from ja_experiments.life import Life
 from ja_experiments.looks import load_looks
 from ja_experiments.processes import side_by_side
@@ -88,8 +88,7 @@ def _gates() -> dict[str, dict[str, Any]]:
     rows: dict[str, dict[str, Any]] = {}
     for (gate, objects), found in zip(conditions, lives, strict=True):
         name = f'{objects} objects, gate: {gate}'
-        rows[f'{name}: whole life'] = _share([life.success.mean() for life in found])
-        rows[f'{name}: last {LAST}'] = _share([life.success[-LAST:].mean() for life in found])
+        rows |= _success(name, found)
         if gate == 'evidence':
             rows[f'{name}: opened after'] = _number([life.opened for life in found], 'trials')
     return rows
@@ -110,8 +109,7 @@ def _ablation() -> dict[str, dict[str, Any]]:
     rows: dict[str, dict[str, Any]] = {}
     for (around, top_down), found in zip(conditions, lives, strict=True):
         name = f'look around: {around}, top-down: {"on" if top_down else "off"}'
-        rows[f'{name}: whole life'] = _share([life.success.mean() for life in found])
-        rows[f'{name}: last {LAST}'] = _share([life.success[-LAST:].mean() for life in found])
+        rows |= _success(name, found)
         rows[f'{name}: opened after'] = _number([life.opened for life in found], 'trials')
         rows[f'{name}: cost'] = _number([life.images_a_trial for life in found], 'images a trial')
     return rows
@@ -127,25 +125,22 @@ def _changes() -> dict[str, dict[str, Any]]:
         parts = {'50 trials before': slice(at - 50, at), 'first 50 after': slice(at, at + 50)}
         for part, trials in {**parts, 'last 50': slice(-50, None)}.items():
             shares = [life.success[trials].mean() for life in found]
-            rows[f'{kind} after {at}, {part}'] = _share(shares)
+            rows[f'{kind} after {at}, {part}'] = success_row(shares)
         lowest = [life.p_lm[at:].min() for life in found]
         rows[f'{kind} after {at}, lowest p(LM)'] = _number(lowest, 'p(LM)')
     return rows
 
 
+def _success(name: str, lives: list[Lived]) -> dict[str, dict[str, Any]]:
+    return {
+        f'{name}: whole life': success_row([life.success.mean() for life in lives]),
+        f'{name}: last {LAST}': success_row([life.success[-LAST:].mean() for life in lives]),
+    }
+
+
 def _by_condition(lives: list[Lived]) -> list[list[Lived]]:
     count = len(SEEDS)
     return [lives[start : start + count] for start in range(0, len(lives), count)]
-
-
-def _share(shares: list[float]) -> dict[str, Any]:
-    estimate = over_seeds(shares)
-    return {
-        'value': estimate.mean,
-        'unit': 'success',
-        'n': estimate.n,
-        'interval': [estimate.low, estimate.high],
-    }
 
 
 def _number(values: list[float], unit: str) -> dict[str, Any]:

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ja_experiments.benchmarks._rows import success_row
 from ja_experiments.benchmarks.world import ceiling
-from ja_experiments.estimate import over_seeds
 from ja_experiments.looks import POOL, Looks, load_looks
 from ja_experiments.processes import side_by_side
 from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
@@ -72,7 +72,7 @@ def run() -> dict[str, dict[str, Any]]:
         for kind in KINDS:
             curves = np.array([found[kind, condition, seed] for seed in SEEDS])
             for mark, shares in zip(condition.marks, curves.T, strict=True):
-                rows[f'{kind}, {condition.name}: {mark} trials'] = _row(shares)
+                rows[f'{kind}, {condition.name}: {mark} trials'] = success_row(shares)
     return rows | ceiling()
 
 
@@ -141,13 +141,3 @@ def _place(rng: np.random.Generator, taken: list[NDArray[np.float64]]) -> NDArra
         clear = all(np.hypot(*(place - other)) > _APART_RAD for other in taken)
         if clear and np.hypot(*place) > _FROM_FACE_RAD:
             return place
-
-
-def _row(shares: NDArray[np.float64]) -> dict[str, Any]:
-    estimate = over_seeds(shares)
-    return {
-        'value': estimate.mean,
-        'unit': 'success',
-        'n': estimate.n,
-        'interval': [estimate.low, estimate.high],
-    }

@@ -239,14 +239,14 @@ class GazeLineLearner:
         self._alarm.reset()
         self._evidence.nats[:] = 0.0
         members = self.config.members
-        self._forget_all(list(range(0, members, 2)))
+        self._forget_weights(list(range(0, members, 2)))
         self._annealing = _annealing(members)
         self._began[:] = 0
         self._optimiser.state.clear()
         self._steps = 0
 
-    def _forget_all(self, members: list[int]) -> None:
-        """These members begin from nothing, and slowly."""
+    def _forget_weights(self, members: list[int]) -> None:
+        """These members begin from nothing."""
         seed = int(torch.randint(2**62, (), generator=self._random))
         fresh = _untaught(self.config, seed)
         with torch.no_grad():
@@ -257,9 +257,6 @@ class GazeLineLearner:
             for kept in self._optimiser.state.values():
                 for moments in (kept['exp_avg'], kept['exp_avg_sq']):
                     moments.reshape(self.config.members, -1)[members] = 0.0
-        self._evidence.nats[members] = 0.0
-        self._annealing[members] = _SLOWEST
-        self._began[members] = len(self._memory)
 
     def _replace_the_beaten(self) -> None:
         """Overwrite the worst member by the best, if the evidence between them is clear.
@@ -272,7 +269,10 @@ class GazeLineLearner:
         best, worst = int(np.argmax(nats)), int(np.argmin(nats))
         if nats[best] < 0:
             if nats[worst] < -_WRONG_NATS and self._alarm.doubt == 0.0:
-                self._forget_all([worst])
+                self._forget_weights([worst])
+                nats[worst] = 0.0
+                self._annealing[worst] = _SLOWEST
+                self._began[worst] = len(self._memory)
             return
         if nats[best] - nats[worst] < _BEATEN_BY_NATS:
             return
