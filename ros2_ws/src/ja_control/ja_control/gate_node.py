@@ -67,7 +67,7 @@ class GateConfig:
         '(else: commands at control_rate_hz, whatever the camera does)',
     )
     control_rate_hz: float = parameter(
-        100.0, 'commands a second, and steps of the motion profile', low=10.0, high=500.0
+        200.0, 'commands a second, and steps of the motion profile', low=10.0, high=500.0
     )
     limits_from: str = parameter(
         'parameters',

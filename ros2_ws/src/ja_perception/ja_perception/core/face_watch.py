@@ -1,8 +1,9 @@
 """Keeps an eye on faces from image to image: where to look for them, and which is the caregiver's.
 
 A face is remembered by its direction from the base, so that the head's own motion does not lose
-it. At most two looks are spent on an image: one at the caregiver, unless her face is unchanged,
-and one at the next place of a scan that goes round the picture in squares of several sizes.
+it. Looks are at the caregiver, unless her face is unchanged, and at the next place of a scan that
+goes round the picture in squares of several sizes: one look an image, two where she is missing or
+keeps the scan waiting for long.
 """
 
 from dataclasses import dataclass
@@ -51,7 +52,8 @@ class FaceConfig:
         0.0625, 'smallest face searched for (share of the width of the image)', low=0.01, high=1.0
     )
     scan_every: int = parameter(
-        5, 'images from one scanning look to the next while the caregiver is known',
+        5, 'images from one scanning look to the next while the caregiver is known (twice as many while '
+        'she moves)',
         low=1, high=1000,
     )  # fmt: skip
     hold_face_s: float = parameter(
@@ -203,7 +205,7 @@ class FaceWatch:
                 caregiver.missed_s = 0.0
             else:
                 squares.append(look_at(box, whole))
-        if self._scan_is_due(expected):
+        if self._scan_is_due(expected, busy=bool(squares)):
             places = scan_squares(width, height, self._smallest_square(width))
             self._scan_place = (self._scan_place + 1) % len(places)
             if places[self._scan_place] not in squares:
@@ -222,16 +224,21 @@ class FaceWatch:
         smallest_px = max(self._config.smallest_face_share * width, _LEAST_FACE_PX)
         return smallest_px / self._finder.smallest_share
 
-    def _scan_is_due(self, expected: list[WatchedFace]) -> bool:
-        """Every so many images; in every image while the caregiver is unknown or not in place."""
-        caregiver = self._caregiver
+    def _scan_is_due(self, expected: list[WatchedFace], busy: bool) -> bool:
+        """In every image while the caregiver is unknown or not in place, else every so many.
+
+        A scan waits for an image in which she needs no look (``busy``), as many images again at
+        most: looks are what an image costs, and the latest command is as late as the dearest one.
+        """
+        caregiver, period = self._caregiver, self._config.scan_every
         lost = caregiver is None or (
             caregiver in expected and caregiver.missed_s > self._config.hold_face_s
         )
-        if lost or self._until_scan <= 0:
-            self._until_scan = self._config.scan_every - 1
-            return True
         self._until_scan -= 1
+        due = self._until_scan < 0 and not (busy and self._until_scan >= -period)
+        if lost or due:
+            self._until_scan = period - 1
+            return True
         return False
 
     def _second_look(
