@@ -2,6 +2,7 @@
 
 import math
 import time
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
+from ja_common.core.config import ConfigError
 from ja_common.core.health import Level
 from ja_common.point_cloud_codec import encode_columns
 from ja_common.time_codec import to_ns, to_time
@@ -307,6 +309,16 @@ def test_count_of_trials_outlives_the_gate(make_graph, tmp_path):
     assert trials > 41
     assert path.read_text() == f'{trials}\n'
     assert [each.name for each in tmp_path.iterdir()] == ['trials']
+
+
+def test_heads_side_by_side_count_their_trials_apart(make_bench, tmp_path):
+    (tmp_path / 'left').mkdir()
+    (tmp_path / 'left' / 'trials').write_text('41\n')
+    (tmp_path / 'trials').write_text('no count\n')
+    in_namespace = partial(GateNode, namespace='left')
+    make_bench(in_namespace, trials_file=str(tmp_path / 'trials'))
+    with pytest.raises(ConfigError, match='holds no count of trials'):
+        make_bench(GateNode, trials_file=str(tmp_path / 'trials'))
 
 
 def test_joint_trajectory_has_one_point_to_be_taken_at_once(make_bench):

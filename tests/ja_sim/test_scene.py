@@ -8,7 +8,7 @@ from ja_sim.core.specs import HEAD_PRESETS, HeadSpec, ObjectsSpec
 
 
 def test_every_shipped_scene_loads():
-    assert {'default', 'easy'} <= set(scene_names())
+    assert {'bare_room', 'default', 'easy'} <= set(scene_names())
     for name in scene_names():
         assert load_scene(name).name == name
 
@@ -66,7 +66,7 @@ def test_a_mistake_is_told_with_its_line(tmp_path, text, line, part):
 
 
 def test_unknown_names_and_missing_files_are_told(tmp_path):
-    with pytest.raises(SceneError, match='the package has default, easy'):
+    with pytest.raises(SceneError, match='the package has bare_room, default, easy'):
         load_scene('defalt')
     with pytest.raises(SceneError, match='cannot be read'):
         load_scene(str(tmp_path / 'nowhere.yaml'))

@@ -76,7 +76,9 @@ class GateConfig:
         choices=('parameters', 'robot_description'),
     )
     trials_file: str = parameter(
-        '', 'where the count of trials outlives a restart; empty: nowhere'
+        '',
+        'where the count of trials outlives a restart, in a folder there of its own for each '
+        'namespace; empty: nowhere',
     )
 
 
@@ -105,7 +107,9 @@ class GateNode(GraphNode):
             np.random.default_rng(self._config.seed),
             lambda target: self._border.limits.reachable(target),
         )
-        self._trials_file = Path(self._config.trials_file).expanduser()
+        kept = Path(self._config.trials_file).expanduser()
+        # Heads side by side differ by their namespaces.
+        self._trials_file = kept.parent / self.get_namespace().strip('/') / kept.name
         self._cycle.trials = self._kept_trials()
 
         self._postures = PostureListener(self, self._joints)
