@@ -3,7 +3,7 @@
 Each time is that at which DDS was given the message, as its publisher's host says: no listener,
 however late, makes it longer or shorter. The camera info goes out just before the picture; its
 time stands for the picture's, so that handing over the picture is counted as well. The gate
-commands at its own rate: half a control period (5 ms) of the last hop is waiting, on average.
+commands at its own rate: half a control period (2.5 ms) of the last hop is waiting, on average.
 
 Camera and head are the sim's, in processes of their own as drivers are on a rig; it is the mind
 that is composed in one process or in many.
