@@ -147,6 +147,17 @@ def test_unchanged_face_costs_no_look():
     assert len(world.squares) == 1
 
 
+def test_a_scan_waits_for_an_image_in_which_her_face_needs_no_look():
+    world = World(Person(), scan_every=5)
+    world.look()
+    looks = [len(world.squares) for _ in range(40) if world.look()]
+    # She is looked at in every image; the scan comes all the same, every tenth.
+    assert looks == ([1] * 9 + [2]) * 4
+    world.look(changed=False)  # remembers the picture that stays the same from here on
+    looks = [len(world.squares) for _ in range(20) if world.look(changed=False)]
+    assert max(looks) == 1 and sum(looks) == 4
+
+
 def test_clock_set_back_forgets():
     world = World(Person())
     (first,) = world.look()
