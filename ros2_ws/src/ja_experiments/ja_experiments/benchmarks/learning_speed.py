@@ -5,8 +5,8 @@ the learner alone chooses among the objects of 500 looks that it never learned f
 network learns from the object that it happened to fixate, drawn among all that were seen, as in
 its first stage; of its proposal the nearest object is taken. Two ceilings stand beside them: that
 of `./ja bench world`, for whoever sees exactly where her eyes point, and what the fast learner
-reaches if it is told what she means, which no robot is: the most that its networks get from as many
-pictures of her face.
+reaches if it is told what she means, which no robot is: the most that its networks get from as
+many pictures of her face.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ _FROM_FACE_RAD, _APART_RAD = np.radians([8.0, 5.0])
 class Condition:
     """What is asked. `pool`: learn from so many looks only, and be tested on them; 0: fresh ones.
 
-    `marks`: after which trials. `change_at`: after so many trials she is another caregiver, or sits
-    in `another_room` (a scene); 0: never. `told`: what she means is the only candidate.
+    `marks`: after which trials. `change_at`: after so many trials she is another caregiver, or
+    sits in `another_room` (a scene); 0: never. `told`: what she means is the only candidate.
     """
 
     name: str

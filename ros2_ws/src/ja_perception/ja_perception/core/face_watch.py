@@ -52,8 +52,9 @@ class FaceConfig:
         0.0625, 'smallest face searched for (share of the width of the image)', low=0.01, high=1.0
     )
     scan_every: int = parameter(
-        5, 'images from one scanning look to the next while the caregiver is known (twice as many while '
-        'she moves)',
+        5,
+        'images from one scanning look to the next while the caregiver is known (twice as many '
+        'while she moves)',
         low=1, high=1000,
     )  # fmt: skip
     hold_face_s: float = parameter(
