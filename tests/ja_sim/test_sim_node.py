@@ -224,7 +224,7 @@ def test_broken_command_is_one_clear_error_and_moves_nothing(make_rig):
 @pytest.mark.parametrize(
     ('parameters', 'text'),
     [
-        ({'scene': 'nowhere'}, "no scene 'nowhere': the package has default, easy"),
+        ({'scene': 'nowhere'}, "no scene 'nowhere': the package has bare_room, default, easy"),
         ({'image_width': 0}, 'image_width'),
         ({'camera_rate_hz': 'fast'}, "camera_rate_hz = 'fast' is a str"),
     ],
