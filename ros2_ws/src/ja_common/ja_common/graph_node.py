@@ -4,6 +4,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, TypeVar
 
 import rclpy
@@ -111,6 +112,10 @@ class GraphNode(Node):
 
         service = self.create_service(service_type, name, guarded)
         self.offered_services[service.srv_name] = service_type
+
+    def folder_of_its_own(self, folder: str | Path) -> Path:
+        """Where in a folder this node's files go: heads side by side differ by namespaces."""
+        return Path(folder).expanduser() / self.get_namespace().strip('/')
 
     def problem(self, where: str, message: str, level: Level = Level.ERROR) -> None:
         """Something is wrong: into /diagnostics, and into the log when it is news."""

@@ -107,9 +107,8 @@ class GateNode(GraphNode):
             np.random.default_rng(self._config.seed),
             lambda target: self._border.limits.reachable(target),
         )
-        kept = Path(self._config.trials_file).expanduser()
-        # Heads side by side differ by their namespaces.
-        self._trials_file = kept.parent / self.get_namespace().strip('/') / kept.name
+        kept = Path(self._config.trials_file)
+        self._trials_file = self.folder_of_its_own(kept.parent) / kept.name
         self._cycle.trials = self._kept_trials()
 
         self._postures = PostureListener(self, self._joints)

@@ -94,9 +94,7 @@ class KeptLearner:
     def _open(self, config: CheckpointConfig) -> CheckpointFolder | None:
         if not config.checkpoint_folder:
             return None
-        # Heads side by side differ by their namespaces.
-        namespace = self._node.get_namespace().strip('/')
-        return CheckpointFolder(Path(config.checkpoint_folder).expanduser() / namespace, config)
+        return CheckpointFolder(self._node.folder_of_its_own(config.checkpoint_folder), config)
 
     def _at_work(self, learner: Learner) -> BackgroundLearner:
         return BackgroundLearner(learner, self._after_lesson, self._behind)

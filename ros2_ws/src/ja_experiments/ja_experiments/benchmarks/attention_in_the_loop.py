@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ja_experiments.benchmarks._rows import success_row
+from ja_experiments.benchmarks.learning_speed import LOOKS
 from ja_experiments.config import ExperimentConfig
 from ja_experiments.life import Life
 from ja_experiments.looks import load_looks
@@ -24,8 +25,6 @@ SEEDS = range(3)
 TRIALS, LAST = 400, 100
 OBJECTS = (1, 3, 5, 10)
 BEFORE_CHANGE = 200
-LOOKS = 2500
-"""The same looks as those of `learning_speed`."""
 
 _BASE = {
     # A glance lasts for one image, a fixation for two.

@@ -30,8 +30,8 @@ from ja_learning.core.trial import Trial
 SEEDS = range(10)
 TRIALS = 2000
 TEST_LOOKS = 500
-LOOKS_ELSEWHERE = 100
-"""Of the other caregiver, or in the other room, there are so many looks to learn from."""
+LOOKS = TRIALS + TEST_LOOKS
+LOOKS_IN_ANOTHER_ROOM = 100 + TEST_LOOKS
 # Where the objects of the default scene may stand, and how near to her face and to each other.
 _FIELD_RAD = np.radians([40.0, 15.0])
 _FROM_FACE_RAD, _APART_RAD = np.radians([8.0, 5.0])
@@ -74,7 +74,7 @@ KINDS = (GazeLineLearner.kind, ThreeLayerNetwork.kind)
 def run() -> dict[str, dict[str, Any]]:
     """Success of the learner alone after so many trials: mean over seeds and its 95 % interval."""
     for seed in SEEDS:
-        load_looks('default', seed, TRIALS + TEST_LOOKS)
+        load_looks('default', seed, LOOKS)
         for condition in CONDITIONS:
             _looks_elsewhere(condition, seed)
     asked = [
@@ -97,7 +97,7 @@ def run() -> dict[str, dict[str, Any]]:
 def curve(kind: str, condition: Condition, seed: int) -> list[float]:
     """Success of one learner alone, 0-1, after each of the marks."""
     rng = np.random.default_rng([seed, condition.objects])
-    looks = load_looks('default', seed, TRIALS + TEST_LOOKS)
+    looks = load_looks('default', seed, LOOKS)
     elsewhere = _looks_elsewhere(condition, seed)
     learner = make_learner(LearnerChoice(kind), NetworkConfig(), GazeLineConfig(), seed)
     found = []
@@ -115,8 +115,8 @@ def _looks_elsewhere(condition: Condition, seed: int) -> Looks | None:
     if not condition.change_at:
         return None
     if condition.another_room:
-        return load_looks(condition.another_room, seed, LOOKS_ELSEWHERE + TEST_LOOKS)
-    return load_looks('default', (seed + 1) % len(SEEDS), TRIALS + TEST_LOOKS)
+        return load_looks(condition.another_room, seed, LOOKS_IN_ANOTHER_ROOM)
+    return load_looks('default', (seed + 1) % len(SEEDS), LOOKS)
 
 
 def success(learner: Learner, looks: Looks, objects: int, seed: int) -> float:

@@ -236,8 +236,8 @@ class FaceWatch:
             caregiver in expected and caregiver.missed_s > self._config.hold_face_s
         )
         self._until_scan -= 1
-        due = self._until_scan < 0 and not (busy and self._until_scan >= -period)
-        if lost or due:
+        longest_wait = period if busy else 0
+        if lost or self._until_scan < -longest_wait:
             self._until_scan = period - 1
             return True
         return False
