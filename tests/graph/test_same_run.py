@@ -58,28 +58,30 @@ class Witness(Node):
         return [(*key, self.said[key]) for key in sorted(self.said) if key[0] <= stamps[-1]]
 
 
-def graph() -> list[NodeSpec]:
+def graph(draw_ahead: bool) -> list[NodeSpec]:
     """Half of the shifts follow the learner, so that all it has learned shows in the commands."""
     gate = {'gating': 'constant', 'p_lm_max': 0.5}
-    small = {'scene': 'default', 'image_width': 160, 'image_height': 120}
+    small = {
+        'scene': 'default', 'image_width': 160, 'image_height': 120, 'draw_ahead': draw_ahead,
+    }  # fmt: skip
     return [
         replace(node, parameters={**node.parameters, **gate}) if node.thing == 'gate' else node
         for node in sim_graph(seed=5, sim_parameters=small)
     ]
 
 
-def run_in_one() -> Witness:
+def run_in_one(draw_ahead: bool) -> Witness:
     witness: list[Witness] = []
 
     def make(context: Context) -> Witness:
         witness.append(Witness(context))
         return witness[0]
 
-    assert run_in_one_process(graph(), make, lambda: witness[0].has_seen_enough()) == 0
+    assert run_in_one_process(graph(draw_ahead), make, lambda: witness[0].has_seen_enough()) == 0
     return witness[0]
 
 
-def run_in_many(folder: Path) -> Witness:
+def run_in_many(folder: Path, draw_ahead: bool) -> Witness:
     context = Context()
     rclpy.init(args=[], context=context)
     executor = KeptWaitSetExecutor(context=context)
@@ -91,7 +93,7 @@ def run_in_many(folder: Path) -> Witness:
         return witness.has_seen_enough()
 
     try:
-        assert Supervisor(graph(), folder, 'stop', print).run(tick) == 0
+        assert Supervisor(graph(draw_ahead), folder, 'stop', print).run(tick) == 0
     finally:
         executor.shutdown()
         witness.destroy_node()
@@ -99,8 +101,10 @@ def run_in_many(folder: Path) -> Witness:
     return witness
 
 
-def test_the_same_seed_gives_the_same_run_in_one_process_and_in_many(tmp_path):
-    first, *others = (run_in_one(), run_in_many(tmp_path / '1'), run_in_many(tmp_path / '2'))
+@pytest.mark.parametrize('draw_ahead', [False, True])
+def test_the_same_seed_gives_the_same_run_in_one_process_and_in_many(tmp_path, draw_ahead):
+    first = run_in_one(draw_ahead)
+    others = [run_in_many(tmp_path / name, draw_ahead) for name in ('1', '2')]
     expected = first.run()
     assert len({stamp for stamp, _, _ in expected}) == IMAGES
     for other in others:

@@ -118,6 +118,34 @@ def run(rig, postures=((0.0, 0.0), (0.1, 0.0), (0.1, 0.1), (0.0, 0.0))):
     return [bytes(rig.step(*posture).data) for posture in postures]
 
 
+def pan(rig):
+    return JointCodec(JointConfig()).decode(rig.at_image(JOINT_STATES))[0]
+
+
+def test_drawing_ahead_shows_what_a_command_does_one_picture_later(make_rig):
+    rig = make_rig(draw_ahead=True)
+    first = stamp(rig.image)
+    rig.step(0.2, 0.0)
+    assert pan(rig) == pytest.approx(0.0, abs=0.01), 'it was drawn before the command came'
+    rig.step(-0.1, 0.0)
+    assert pan(rig) == pytest.approx(0.2, abs=0.01)
+    rig.step(-0.1, 0.0)
+    assert pan(rig) == pytest.approx(-0.1, abs=0.01)
+    assert stamp(rig.image) == first + 3 * PERIOD_NS, 'none is left out'
+
+
+def test_nothing_of_the_world_before_a_reset_is_left_when_drawing_ahead(make_rig):
+    rig = make_rig(draw_ahead=True, seed=3)
+    pictures = run(rig)
+    rig.step(0.3, 0.0)
+    last = stamp(rig.image)
+    assert rig.bench.call(Trigger, 'sim/reset').success
+    rig.bench.wait(lambda: stamp(rig.image) > last)
+    assert run(rig) == pictures
+    assert rig.bench.set_parameter('objects', 1).successful
+    rig.bench.wait(lambda: len(decode_truth(rig.at_image(SIM_TRUTH)).directions) == 1)
+
+
 def test_same_seed_and_commands_give_the_same_pictures_also_after_a_reset(make_rig):
     rig = make_rig(seed=3)
     pictures, last = run(rig), stamp(rig.image)

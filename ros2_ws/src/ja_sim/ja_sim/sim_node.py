@@ -2,9 +2,13 @@
 
 import math
 import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
 from rclpy.timer import Timer
@@ -34,6 +38,7 @@ from ja_sim.core.world import JointAttentionWorld
 from ja_sim.truth_codec import encode_truth
 
 CAMERA_FRAME = 'camera_optical_frame'
+_T = TypeVar('_T')
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,11 @@ class SimConfig:
     joint_states_per_image: int = parameter(1, 'joint states an image', low=1, high=100)
     lockstep: bool = parameter(
         True, 'step when the command for the last image has come (else: in real time)'
+    )
+    draw_ahead: bool = parameter(
+        False,
+        'in lockstep: draw the next picture while the last is judged: more images a second, and a '
+        'command moves the head one picture later, as behind a slower camera',
     )
     resend_after_s: float = parameter(
         0.5, 'in lockstep or a pause: send the last image again after so long',
@@ -87,7 +97,9 @@ class SimNode(GraphNode):
         self._config = self.configure(SimConfig)
         self._live = self.configure(LiveConfig, self._on_live_config)
         self._joints = JointCodec(self.configure(JointConfig))
-        self._world = self._make_world(self._live.objects)
+        # An OpenGL context belongs to one thread: this one makes the worlds and draws them.
+        self._studio, self._closed = ThreadPoolExecutor(1, 'studio'), False
+        self._world = self._in_studio(self._make_world, self._live.objects)
         # The world's time starts at nought after a reset; the time of the graph never goes back.
         self._time_offset_ns = 0
         self.hear(JOINT_COMMANDS, self._on_command, expected_every_s=2.0)
@@ -101,7 +113,10 @@ class SimNode(GraphNode):
         self.offer(Trigger, 'sim/step', self._on_step)
         self.offer(Trigger, 'sim/rearrange', self._on_rearrange)
 
-        self._round = self._advance()
+        self._command: NDArray[np.float64] | None = None
+        self._ahead = self._config.lockstep and self._config.draw_ahead
+        self._drawn = self._draw()
+        self._round = self._next_round()
         self._published_s = -math.inf
         self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
         self._pace = Pace(self._config.lockstep)
@@ -111,7 +126,10 @@ class SimNode(GraphNode):
 
     def destroy_node(self) -> None:
         """Close the renderer, then the node."""
-        self._world.close()
+        if not self._closed:
+            self._closed = True
+            self._in_studio(self._world.close)
+            self._studio.shutdown()
         super().destroy_node()
 
     def _on_command(self, message: JointState) -> None:
@@ -121,7 +139,7 @@ class SimNode(GraphNode):
         posture = self._joints.decode_posture(message)
         if posture is None:
             raise ValueError('a command names no joints')
-        self._world.command(posture)
+        self._command = posture
         self._pace.answer()
         self._go_on()
 
@@ -134,9 +152,26 @@ class SimNode(GraphNode):
             self._tick()
 
     def _tick(self) -> None:
-        self._round = self._advance()
+        if not self._ahead:
+            self._drawn = self._draw()
+        self._round = self._next_round()
         self._pace.made()
         self._publish()
+
+    def _next_round(self) -> _Round:
+        """What is being drawn, once it is; drawing ahead, the one after it is begun."""
+        drawn = self._drawn.result()
+        if self._ahead:
+            self._drawn = self._draw()
+        return drawn
+
+    def _draw(self) -> Future[_Round]:
+        """Begin the next round, in which the head follows the newest command."""
+        command, self._command = self._command, None
+        return self._studio.submit(self._advance, command)
+
+    def _in_studio(self, work: Callable[..., _T], *args: Any) -> _T:
+        return self._studio.submit(work, *args).result()
 
     def _resend(self) -> None:
         """In lockstep, as a message may be lost; while time stands still, so that nobody stops."""
@@ -149,7 +184,9 @@ class SimNode(GraphNode):
             self.problem('lockstep', text, Level.WARN)
         self._publish()
 
-    def _advance(self) -> _Round:
+    def _advance(self, command: NDArray[np.float64] | None) -> _Round:
+        if command is not None:
+            self._world.command(command)
         parts = self._config.joint_states_per_image
         joint_states = []
         for _ in range(parts):
@@ -184,7 +221,7 @@ class SimNode(GraphNode):
         return Header(stamp=to_time(stamp_ns + self._time_offset_ns), frame_id=frame_id)
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        self._world.reset(self._config.seed)
+        self._in_studio(self._world.reset, self._config.seed)
         self._begin_anew()
         response.success, response.message = True, f'the world of seed {self._config.seed} again'
         return response
@@ -192,6 +229,10 @@ class SimNode(GraphNode):
     def _begin_anew(self) -> None:
         step_ns = int(NS_PER_S / self._config.camera_rate_hz)
         self._time_offset_ns = to_ns(self._round.clock.clock) + step_ns
+        # Neither a command to the world that was nor a picture of it belongs to the new one.
+        self._command = None
+        if self._ahead:
+            self._drawn = self._draw()
         self._tick()
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> Any:
@@ -208,7 +249,7 @@ class SimNode(GraphNode):
         return response
 
     def _on_rearrange(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        self._world.rearrange()
+        self._in_studio(self._world.rearrange)
         response.success, response.message = True, 'the objects have other places'
         return response
 
@@ -232,11 +273,11 @@ class SimNode(GraphNode):
 
     def _set_objects(self, count: int) -> None:
         try:
-            world = self._make_world(count)
+            world = self._in_studio(self._make_world, count)
         except ConfigError as error:
             self.problem('objects', f'the world stays as it was: {error}')
             return
-        self._world.close()
+        self._in_studio(self._world.close)
         self._world = world
         self._begin_anew()
 
