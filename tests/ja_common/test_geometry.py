@@ -14,6 +14,7 @@ from ja_common.core.geometry import (
     head_rotation,
     rays_of_directions,
     vectors_of_directions,
+    vectors_of_rays,
 )
 
 angles = st.tuples(st.floats(-1.2, 1.2), st.floats(-1.0, 1.0))
@@ -66,6 +67,13 @@ def test_ray_to_direction_and_back(posture, ray):
 def test_what_is_behind_the_camera_has_no_ray():
     assert np.isnan(rays_of_directions((0.0, 0.0), (math.pi, 0.0))).all()
     assert not np.isnan(rays_of_directions((2.8, 0.0), (math.pi, 0.0))).any()
+
+
+@given(angles, rays)
+def test_a_ray_and_its_direction_are_the_same_vector(posture, ray):
+    vector = vectors_of_rays(posture, ray)
+    direction = vectors_of_directions(directions_of_rays(posture, ray))
+    assert vector / np.linalg.norm(vector) == pytest.approx(direction, abs=1e-9)
 
 
 def test_many_at_once_equal_one_by_one():

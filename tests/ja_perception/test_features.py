@@ -49,22 +49,25 @@ def checkers(shift=0):
 
 
 def test_motion_forgives_a_pixel_and_a_change_of_light_but_not_a_mover():
-    everywhere = np.ones((40, 60), np.uint8)
-    assert not motion_map(checkers(1), checkers(), everywhere, CONFIG).any()
-    assert not motion_map(checkers() + np.uint8(50), checkers(), everywhere, CONFIG).any()
+    assert not motion_map(checkers(1), checkers(), CONFIG).any()
+    assert not motion_map(checkers() + np.uint8(50), checkers(), CONFIG).any()
+    assert not motion_map(checkers() - np.uint8(50), checkers(), CONFIG).any()
     moved = checkers()
     moved[10:22, 20:32] = 255
-    moving = motion_map(moved, checkers(), everywhere, CONFIG)
+    moving = motion_map(moved, checkers(), CONFIG)
     assert moving[12:20, 22:30].mean() > 0.9
     assert moving[:, 40:].sum() == 0
 
 
 def test_nothing_moves_where_nothing_was_in_view_before():
-    left = np.zeros((40, 60), np.uint8)
-    left[:, :30] = 1
-    moving = motion_map(255 - checkers(), checkers(), left, CONFIG)
+    expected = checkers()
+    expected[:, 30:] = 0
+    moved = checkers()
+    moved[:, 10:25] = moved[:, 35:] = 255
+    moving = motion_map(moved, expected, CONFIG)
+    assert moving[:, 12:23].any()
     assert moving[:, 30:].sum() == 0
-    assert not motion_map(255 - checkers(), checkers(), 0 * left, CONFIG).any()
+    assert not motion_map(255 - checkers(), 0 * expected, CONFIG).any()
 
 
 def test_specks_go_and_the_rest_stays_in_place():

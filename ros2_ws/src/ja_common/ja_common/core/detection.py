@@ -1,7 +1,7 @@
 """What the detector says of one thing in one image."""
 
-from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,7 @@ class Kind(IntEnum):
     FACE = 1
 
 
-@dataclass(frozen=True)
-class Detection:
+class Detection(NamedTuple):
     """One object or face in one image.
 
     `x`, `y`: ray in the optical frame, z = 1 (lens distortion removed). `u`, `v`, `width`,

@@ -34,11 +34,16 @@ def head_rotation(posture: ArrayLike) -> NDArray[np.float64]:
     return np.array([[cp * ct, -sp, cp * st], [sp * ct, cp, sp * st], [-st, 0.0, ct]])
 
 
-def directions_of_rays(posture: ArrayLike, rays: ArrayLike) -> NDArray[np.float64]:
-    """Directions, shape (..., 2) [rad], of things seen at rays (..., 2) from a posture."""
+def vectors_of_rays(posture: ArrayLike, rays: ArrayLike) -> NDArray[np.float64]:
+    """Base-frame vectors, shape (..., 3), of rays (..., 2) from a posture: one unit deep."""
     rays = np.asarray(rays, float)
     in_head = _as_last_axis(np.ones(rays.shape[:-1]), -rays[..., 0], -rays[..., 1])
-    return directions_of_vectors(in_head @ head_rotation(posture).T)
+    return in_head @ head_rotation(posture).T
+
+
+def directions_of_rays(posture: ArrayLike, rays: ArrayLike) -> NDArray[np.float64]:
+    """Directions, shape (..., 2) [rad], of things seen at rays (..., 2) from a posture."""
+    return directions_of_vectors(vectors_of_rays(posture, rays))
 
 
 def rays_of_directions(posture: ArrayLike, directions: ArrayLike) -> NDArray[np.float64]:

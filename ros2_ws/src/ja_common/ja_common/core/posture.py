@@ -32,7 +32,7 @@ class Posture:
 
     def is_still(self, still_below_rad_s: float) -> bool:
         """Are both joints slower than the given speed [rad/s]?"""
-        return bool(np.all(np.abs(self.velocity) < still_below_rad_s))
+        return all(abs(speed) < still_below_rad_s for speed in self.velocity.tolist())
 
 
 class PostureHistory:

@@ -1,13 +1,16 @@
 """Upright rectangles in an image."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 # An empty box overlaps nothing.
 _TINY = 1e-12
+# Pixel (0, 0) is the centre of the first pixel: the image begins half a pixel before it.
+_PIXEL_CENTRE = np.array([0.5, 0.5, 0.0, 0.0])
+# From (u, v, width, height) to (left, top, right, bottom).
+_CORNERS = np.array([[1, 0, 1, 0], [0, 1, 0, 1], [-0.5, 0, 0.5, 0], [0, -0.5, 0, 0.5]])
 
 
 class Box(NamedTuple):
@@ -40,12 +43,23 @@ class Box(NamedTuple):
         return float(overlaps([self], [other])[0, 0])
 
 
-def overlaps(boxes: Sequence[Box], others: Sequence[Box]) -> NDArray[np.float64]:
-    """``Box.overlap`` of each of ``boxes`` with each of ``others``, shape (n, m)."""
-    one = np.array(boxes, float).reshape(-1, 1, 4)
-    other = np.array(others, float).reshape(1, -1, 4)
-    reach = (one[..., 2:] + other[..., 2:]) / 2 - np.abs(one[..., :2] - other[..., :2])
-    narrower = np.minimum(one[..., 2:], other[..., 2:])
-    shared = np.maximum(np.minimum(reach, narrower), 0.0)
+def scaled(boxes: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
+    """``Box.scaled`` of each of the boxes (n, 4)."""
+    return (boxes + _PIXEL_CENTRE) * factor - _PIXEL_CENTRE
+
+
+def corners(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Left, top, right and bottom, shape (n, 4), of boxes (n, 4)."""
+    return boxes @ _CORNERS
+
+
+def overlaps(boxes: ArrayLike, others: ArrayLike) -> NDArray[np.float64]:
+    """``Box.overlap`` of each of ``boxes`` (n, 4) with each of ``others`` (m, 4), (n, m)."""
+    one = np.asarray(boxes, float).reshape(-1, 1, 4)
+    other = np.asarray(others, float).reshape(1, -1, 4)
+    first, second = corners(one), corners(other)
+    sides = np.minimum(first[..., 2:], second[..., 2:])
+    sides -= np.maximum(first[..., :2], second[..., :2])
+    np.maximum(sides, 0.0, out=sides)
     areas = np.minimum(one[..., 2] * one[..., 3], other[..., 2] * other[..., 3])
-    return shared[..., 0] * shared[..., 1] / np.maximum(areas, _TINY)
+    return sides[..., 0] * sides[..., 1] / np.maximum(areas, _TINY)

@@ -51,7 +51,7 @@ def colour_map(rgb: NDArray[np.uint8], config: FeatureConfig) -> ColourMap:
     hsv = cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV)
     least = (0.0, 255 * config.colour_saturation, 255 * config.colour_value)
     bright = cv2.inRange(hsv, least, (255.0, 255.0, 255.0))
-    return ColourMap(cv2.min(bright, 1), cv2.extractChannel(hsv, 0))
+    return ColourMap(bright & 1, cv2.extractChannel(hsv, 0))
 
 
 def edge_map(grey: Mask, config: FeatureConfig) -> Mask:
@@ -62,19 +62,19 @@ def edge_map(grey: Mask, config: FeatureConfig) -> Mask:
     return _above(steps, 255 * config.edge_contrast)
 
 
-def motion_map(grey: Mask, expected: Mask, seen_before: Mask, config: FeatureConfig) -> Mask:
+def motion_map(grey: Mask, expected: Mask, config: FeatureConfig) -> Mask:
     """Pixels whose brightness is not found near the same place in the ``expected`` image.
 
     Each pixel may take any brightness that its 3x3 neighbours were expected to have: an error of
-    one pixel in the compensation of the head's motion is no motion. Where ``seen_before`` is 0
-    nothing is expected, and nothing moves. A change of light over the whole view is no motion.
+    one pixel in the compensation of the head's motion is no motion. Where 0 is expected there was
+    no view, and nothing moves. A change of light over the whole view is no motion.
     """
-    lighter = cv2.mean(grey, seen_before)[0] - cv2.mean(expected, seen_before)[0]
-    in_same_light = cv2.subtract(grey, lighter)
+    lighter = round(cv2.mean(grey, expected)[0] - cv2.mean(expected, expected)[0])
+    in_same_light = cv2.subtract(grey, lighter) if lighter else grey
     too_light = cv2.subtract(in_same_light, cv2.dilate(expected, _NEIGHBOURS))
     too_dark = cv2.subtract(cv2.erode(expected, _NEIGHBOURS), in_same_light)
     moving = _above(cv2.max(too_light, too_dark), 255 * config.motion_contrast)
-    return without_specks(moving) & seen_before
+    return cv2.copyTo(without_specks(moving), expected)
 
 
 def without_specks(mask: Mask) -> Mask:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ja_common.core.config import parameter
 from ja_perception.core.box import Box, overlaps
 from ja_perception.core.features import ColourMap, Mask, without_specks
-from ja_perception.core.hue_families import HUES, hue_families
+from ja_perception.core.hue_families import HUES, ONE_HUE, hue_families
 from ja_perception.core.patches import Patch, hull, patches_of
 
 # Texture is judged in windows, and rims of a mover are joined over gaps, of these fractions of the
@@ -99,7 +99,7 @@ def texture_window(edges: Mask) -> int:
 def merged(*sources: list[Region]) -> list[Region]:
     """Regions of several detectors as one list: what overlaps an earlier one is the same."""
     regions = [region for source in sources for region in source]
-    boxes = [region.box for region in regions]
+    boxes = np.array([region.box for region in regions], float)
     same = (overlaps(boxes, boxes) >= _MERGED_OVERLAP).tolist()
     kept: list[int] = []
     for source, first in zip(sources, accumulate(map(len, sources), initial=0), strict=False):
@@ -111,6 +111,9 @@ def merged(*sources: list[Region]) -> list[Region]:
 def _parts_by_hue(patch: Patch, hue: NDArray[np.uint8], smallest: int) -> list[Patch]:
     """A patch's differently coloured parts, or the whole patch where they interleave."""
     if patch.area < 2 * smallest:
+        return [patch]
+    least, most, _, _ = cv2.minMaxLoc(hue, patch.mask)
+    if most - least < ONE_HUE:
         return [patch]
     histogram = cv2.calcHist([hue], [0], patch.mask, [HUES], [0, HUES]).ravel()
     family = hue_families(histogram)

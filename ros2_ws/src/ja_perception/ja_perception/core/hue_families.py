@@ -5,22 +5,22 @@ from numpy.typing import NDArray
 
 HUES = 180
 """OpenCV's hues, in steps of two degrees."""
-# Hues within such an arc need no closer look.
-_ONE_HUE = 20
+ONE_HUE = 20
+"""Hues within such an arc are of one family, whatever their histogram."""
 # A hue is a peak of its own when it is this large beside the largest peak, and when the valleys
 # beside it are lower than this share of it.
 _LEAST_PEAK, _VALLEY = 0.1, 0.4
-_BLUR = 4
+# Width of the bell that blurs the histogram, and how far it reaches.
+_BLUR, _REACH = 4, 32
 
 
-def _blurring() -> NDArray[np.float32]:
-    """Blurs a histogram round the circle of hues: (182, 180), for the ends meet in the result."""
-    apart = (np.arange(HUES) - np.arange(-1, HUES + 1)[:, None]) % HUES
-    weights = np.exp(-0.5 * (np.minimum(apart, HUES - apart) / _BLUR) ** 2)
-    return (weights / weights[0].sum()).astype(np.float32)
+def _bell() -> NDArray[np.float32]:
+    """Weights of the hues around one, shape (2 * 32 + 1,)."""
+    weights = np.exp(-0.5 * (np.arange(-_REACH, _REACH + 1) / _BLUR) ** 2)
+    return (weights / weights.sum()).astype(np.float32)
 
 
-_BLURRING = _blurring()
+_BELL = _bell()
 
 
 def hue_families(histogram: NDArray[np.float32]) -> NDArray[np.uint8] | None:
@@ -33,20 +33,24 @@ def hue_families(histogram: NDArray[np.float32]) -> NDArray[np.uint8] | None:
     if not used.size:
         return None
     widest_gap = max(used[0] + HUES - used[-1], (used[1:] - used[:-1]).max(initial=0))
-    if HUES - widest_gap < _ONE_HUE:
+    if HUES - widest_gap < ONE_HUE:
         return None
-    ring = _BLURRING @ histogram
+    # Round the circle of hues, and a hue farther at both ends: there the other end is next.
+    beyond = _REACH + 1
+    round_trip = np.concatenate([histogram[-beyond:], histogram, histogram[:beyond]])
+    ring = np.convolve(round_trip, _BELL, 'valid')
     smooth = ring[1:-1]
     is_peak = (smooth > ring[:-2]) & (smooth >= ring[2:])
     peaks = np.flatnonzero(is_peak & (smooth > _LEAST_PEAK * smooth.max())).tolist()
     twice_round = np.concatenate([smooth, smooth])
     while len(peaks) > 1:
-        ends = [*peaks[1:], peaks[0] + HUES]
-        cuts = [a + int(twice_round[a:b].argmin()) for a, b in zip(peaks, ends, strict=True)]
-        valleys = twice_round[cuts]
+        nexts = [*peaks[1:], peaks[0] + HUES]
+        cuts = [a + int(twice_round[a:b].argmin()) for a, b in zip(peaks, nexts, strict=True)]
+        valleys = twice_round[cuts].tolist()
+        heights = smooth[peaks].tolist()
         # Each peak against the higher of its two valleys: the shallowest one falls first.
-        depths = np.maximum(valleys, np.roll(valleys, 1)) / smooth[peaks]
-        shallowest = int(depths.argmax())
+        depths = [max(valleys[i - 1], valleys[i]) / heights[i] for i in range(len(peaks))]
+        shallowest = depths.index(max(depths))
         if depths[shallowest] <= _VALLEY:
             borders = np.sort(np.array(cuts) % HUES)
             family = np.searchsorted(borders, np.arange(256), side='right') % len(peaks)

@@ -1,5 +1,6 @@
 """Where something moves by itself while the head may move too."""
 
+import math
 from collections import deque
 from dataclasses import dataclass
 
@@ -8,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ja_common.core.config import parameter
-from ja_common.core.geometry import angle_between
+from ja_common.core.geometry import head_rotation
 from ja_common.core.posture import NS_PER_S, Posture
 from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.ego_motion import expected_image, rotation_homography
@@ -36,11 +37,16 @@ class MotionConfig:
 
 @dataclass(frozen=True)
 class _Past:
-    """An earlier image (small, smooth, without lens distortion) and the head's position then."""
+    """An image (small, smooth, nowhere 0, without lens distortion) and how the head stood then."""
 
     grey: Mask
-    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
     stamp_ns: int
+
+    def apart(self, other: '_Past') -> float:
+        """Angle between the two lines of sight [rad]."""
+        cosine = float(self.rotation[:, 0] @ other.rotation[:, 0])
+        return math.acos(max(-1.0, min(1.0, cosine)))
 
 
 class MotionDetector:
@@ -67,10 +73,10 @@ class MotionDetector:
             size = (_WIDTH_PX, max(1, round(height * _WIDTH_PX / width)))
             grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
         camera = camera.resized(grey.shape[1], grey.shape[0])
-        position = np.zeros(2) if posture is None else posture.position
+        rotation = head_rotation((0.0, 0.0) if posture is None else posture.position)
         # Detail as fine as the pixels looks different after every shift by part of a pixel.
         smooth = cv2.blur(straightened(grey, camera), (3, 3))
-        present = _Past(smooth, position, stamp_ns)
+        present = _Past(cv2.max(smooth, 1), rotation, stamp_ns)
         if posture is not None and not posture.is_still(self._config.motion_below_rad_s):
             self._past.clear()
             return None
@@ -94,8 +100,7 @@ class MotionDetector:
         oldest_ns = present.stamp_ns - self._config.motion_span_s * NS_PER_S
         farthest_rad = _FARTHEST_VIEWS * camera.width / camera.fx
         while len(past) > 1 and (
-            past[0].stamp_ns < oldest_ns
-            or angle_between(past[0].position, present.position) > farthest_rad
+            past[0].stamp_ns < oldest_ns or past[0].apart(present) > farthest_rad
         ):
             past.popleft()
         if len(past) < 2:
@@ -105,6 +110,6 @@ class MotionDetector:
         return oldest, min(later, key=lambda p: abs(p.stamp_ns - middle_ns))
 
     def _since(self, past: _Past, present: _Past, camera: CameraModel) -> Mask:
-        homography = rotation_homography(camera, present.position, past.position)
-        expected, seen_before = expected_image(past.grey, homography)
-        return motion_map(present.grey, expected, seen_before, self._features)
+        homography = rotation_homography(camera, present.rotation, past.rotation)
+        expected = expected_image(past.grey, homography)
+        return motion_map(present.grey, expected, self._features)

@@ -1,12 +1,12 @@
 """Numbers for objects that last while the head turns, and a target that does not flicker."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ja_common.core.config import parameter
-from ja_common.core.geometry import angle_between
 from ja_common.core.posture import NS_PER_S
 
 
@@ -29,7 +29,7 @@ class TrackingConfig:
 @dataclass
 class _Track:
     track_id: int
-    direction: NDArray[np.float64]
+    toward: list[float]
     seen_ns: int
 
 
@@ -43,22 +43,23 @@ class ObjectTracker:
         self._target_id: int | None = None
         self._target_ns = 0
 
-    def update(self, directions: ArrayLike, stamp_ns: int) -> list[int]:
-        """Track numbers of the objects seen now in ``directions``, shape (n, 2) [rad]."""
-        directions = np.asarray(directions, float).reshape(-1, 2)
+    def update(self, vectors: ArrayLike, stamp_ns: int) -> list[int]:
+        """Track numbers of the objects seen now along base-frame ``vectors``, shape (n, 3)."""
+        vectors = np.asarray(vectors, float).reshape(-1, 3)
+        toward = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
         forget_ns = self._config.forget_object_after_s * NS_PER_S
         # abs: a clock that was set back forgets as well.
         self._tracks = [t for t in self._tracks if abs(stamp_ns - t.seen_ns) <= forget_ns]
-        ids = [-1] * len(directions)
-        for row, column in self._nearest_first(directions):
-            track = self._tracks[column]
-            ids[row] = track.track_id
-            track.direction, track.seen_ns = directions[row], stamp_ns
-        for row, direction in enumerate(directions):
-            if ids[row] < 0:
-                ids[row] = self._next_id
-                self._tracks.append(_Track(self._next_id, direction, stamp_ns))
+        track_of = self._nearest_first(toward)
+        ids = []
+        for row, unit in enumerate(toward.tolist()):
+            track = track_of.get(row)
+            if track is None:
+                track = _Track(self._next_id, unit, stamp_ns)
+                self._tracks.append(track)
                 self._next_id += 1
+            track.toward, track.seen_ns = unit, stamp_ns
+            ids.append(track.track_id)
         return ids
 
     def held(self, ids: list[int], scores: list[float], stamp_ns: int) -> list[float]:
@@ -68,24 +69,23 @@ class ObjectTracker:
             for i, score in zip(ids, scores, strict=True)
         ]
         if raised and max(raised) > 0:
-            self._target_id = ids[int(np.argmax(raised))]
+            self._target_id = ids[raised.index(max(raised))]
             self._target_ns = stamp_ns
         elif abs(stamp_ns - self._target_ns) > self._config.forget_object_after_s * NS_PER_S:
             self._target_id = None
         return raised
 
-    def _nearest_first(self, directions: NDArray[np.float64]) -> list[tuple[int, int]]:
-        """Pairs (object, track), nearest first, each of both at most once."""
-        if not self._tracks or not len(directions):
-            return []
-        known = np.array([track.direction for track in self._tracks])
-        angles = angle_between(directions[:, None], known[None])
-        near = np.argwhere(angles <= self._config.same_object_within_rad)
-        order = np.argsort(angles[tuple(near.T)], kind='stable')
-        pairs: dict[int, int] = {}
+    def _nearest_first(self, toward: NDArray[np.float64]) -> dict[int, _Track]:
+        """Each object's track: the nearest pairs first, each object and track at most once."""
+        if not self._tracks or not len(toward):
+            return {}
+        cosines = toward @ np.array([track.toward for track in self._tracks]).T
+        rows, columns = np.nonzero(cosines >= math.cos(self._config.same_object_within_rad))
+        near = zip(cosines[rows, columns].tolist(), rows.tolist(), columns.tolist(), strict=True)
+        track_of: dict[int, _Track] = {}
         taken: set[int] = set()
-        for row, column in near[order].tolist():
-            if row not in pairs and column not in taken:
-                pairs[row] = column
+        for _, row, column in sorted(near, reverse=True):
+            if row not in track_of and column not in taken:
+                track_of[row] = self._tracks[column]
                 taken.add(column)
-        return list(pairs.items())
+        return track_of

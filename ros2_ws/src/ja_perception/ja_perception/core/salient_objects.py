@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from ja_common.core.config import parameter
 from ja_common.core.detection import Detection, Kind
 from ja_common.core.fixation import WIDTH_SIXTH
-from ja_common.core.geometry import directions_of_rays
+from ja_common.core.geometry import vectors_of_rays
 from ja_common.core.posture import Posture
-from ja_perception.core.box import Box
+from ja_perception.core.box import Box, corners, scaled
 from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.features import ColourMap, FeatureConfig, Mask, colour_map, edge_map
 from ja_perception.core.grouping import (
@@ -93,20 +93,22 @@ class SalientObjects:
         work_heads = [head.scaled(scale) for head in heads]
         maps = self._maps(work, stamp_ns, work_camera, posture, work_heads)
         regions = self._regions(maps)
-        features = _features(regions, maps, work_camera)
+        work_boxes = np.array([region.box for region in regions], float).reshape(-1, 4)
+        bright_px = np.array([region.bright_px for region in regions], float)
+        features = _features(work_boxes, bright_px, maps, work_camera)
 
         interest = self._interest
         # Eq. 1
         saliency = features @ (interest.alpha_col, interest.alpha_edg, interest.alpha_mot)
-        boxes = [region.box.scaled(1 / scale) for region in regions]
-        rays = camera.rays(np.array(boxes).reshape(-1, 4)[:, :2])
+        boxes = scaled(work_boxes, 1 / scale)
+        rays = camera.rays(boxes[:, :2])
         position = np.zeros(2) if posture is None else posture.position
-        ids = self._tracker.update(directions_of_rays(position, rays), stamp_ns)
+        ids = self._tracker.update(vectors_of_rays(position, rays), stamp_ns)
         scores = self._tracker.held(ids, saliency.tolist(), stamp_ns)
-        rows = zip(rays.tolist(), boxes, scores, ids, features.tolist(), strict=True)
+        rows = zip(rays.tolist(), boxes.tolist(), scores, ids, features.tolist(), strict=True)
         objects = [
-            Detection(Kind.OBJECT, x, y, *box, score, track_id, f_col, f_edg, f_mot)
-            for (x, y), box, score, track_id, (f_col, f_edg, f_mot) in rows
+            Detection(Kind.OBJECT, x, y, u, v, width, height, score, track_id, f_col, f_edg, f_mot)
+            for (x, y), (u, v, width, height), score, track_id, (f_col, f_edg, f_mot) in rows
         ]
         return sorted(objects, key=lambda item: -item.score)
 
@@ -145,23 +147,24 @@ class SalientObjects:
         )
 
 
-def _features(regions: list[Region], maps: _Maps, camera: CameraModel) -> NDArray[np.float64]:
-    """f_col, f_edg and f_mot of each region, shape (n, 3)."""
-    boxes = [region.box for region in regions]
-    u, v, width, height = np.array(boxes).reshape(-1, 4).T
-    edges = np.stack([u - width / 2, v - height / 2, u + width / 2, v + height / 2])
+def _features(
+    boxes: NDArray[np.float64], bright_px: NDArray[np.float64], maps: _Maps, camera: CameraModel
+) -> NDArray[np.float64]:
+    """f_col, f_edg and f_mot, shape (n, 3), of boxes (n, 4) with so many bright pixels (n,)."""
+    height, width = maps.edges.shape
     # Of a coarser map the last row may reach a pixel beyond the image.
-    rows, columns = maps.edges.shape
-    corners = np.round(edges + 0.5).astype(int)
-    np.minimum(corners, [[columns], [rows], [columns], [rows]], out=corners)
-    gazing_px = _GAZING_AREA * camera.fx * camera.fy
-    bright = np.array([region.bright_px for region in regions]) / gazing_px
-    moved = _amounts(maps.moving, corners) / gazing_px
+    edges = np.minimum(np.rint(corners(boxes) + 0.5), (width, height, width, height))
+    edges = edges.astype(int).T
+    edge_px, moving_px = _amounts(maps.edges, edges), _amounts(maps.moving, edges)
     # In less than a window of texture, a few edges would seem dense.
-    judged_px = np.maximum(width * height, texture_window(maps.edges) ** 2)
-    f_edg = np.minimum(1, _amounts(maps.edges, corners) / judged_px)
-    # x / (1 + x) grows with the area but stays below 1, so that no two sizes are equal.
-    return np.stack([bright / (1 + bright), f_edg, moved / (1 + moved)], axis=-1)
+    judged_px = np.maximum(boxes[:, 2] * boxes[:, 3], texture_window(maps.edges) ** 2)
+    features = np.empty((len(boxes), 3))
+    gazing_px = _GAZING_AREA * camera.fx * camera.fy
+    # A / (A + G) grows with the area A but stays below 1, so that no two sizes are equal.
+    features[:, 0] = bright_px / (bright_px + gazing_px)
+    features[:, 1] = np.minimum(edge_px / judged_px, 1)
+    features[:, 2] = moving_px / (moving_px + gazing_px)
+    return features
 
 
 def _scaled(image: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
@@ -183,8 +186,8 @@ def _blank(feature: Mask, box: Box) -> None:
         feature[top:bottom, left:right] = 0
 
 
-def _amounts(feature: Mask, corners: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Sum of a feature in each box, shape (n,), of corners (left, top, right, bottom), (4, n)."""
+def _amounts(feature: Mask, edges: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Sum of a feature in each box, shape (n,), of edges (left, top, right, bottom), (4, n)."""
     sums = cv2.integral(feature)
-    left, top, right, bottom = corners
+    left, top, right, bottom = edges
     return sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
