@@ -10,4 +10,5 @@ def trial(number: int) -> Trial:
     random = np.random.default_rng(number)
     face = random.integers(0, 256, (30, 25)).astype(np.uint8)
     candidates = random.uniform(-0.5, 0.5, (4, 2))
-    return Trial(face, np.array([(0.0, 0.0), (0.1, 0.0)]), candidates[0], candidates)
+    postures = np.array([(0.0, 0.0), (0.1, 0.0)])
+    return Trial(face, postures[0], postures, candidates[0], candidates)

@@ -49,7 +49,7 @@ def test_the_node_learns_what_the_network_learns_from_the_same_trials(tmp_path):
     _, weights = learned(recorded(tmp_path / 'r'), tmp_path / 'a', seed=3)
     network = ThreeLayerNetwork(NetworkConfig(), 3)
     for face, meant, _ in day():
-        network.learn(Trial(face, LOOK[np.newaxis], meant))
+        network.learn(Trial(face, LOOK, LOOK[np.newaxis], meant))
     for name in ('hidden_weights', 'hidden_biases', 'output_weights', 'output_biases'):
         array = network.state()[name]
         np.testing.assert_allclose(weights[name], array, atol=1e-6)

@@ -30,4 +30,4 @@ def looks() -> Looks:
     row, column = np.mgrid[-1:1:30j, -1:1:25j]
     spots = [np.exp(-4 * ((column - p) ** 2 + (row - 2 * t) ** 2)) for p, t in commands]
     grey = 128 + 80 * np.array(spots) + rng.normal(0, 5, (125, 30, 25))
-    return Looks(grey.clip(0, 255).astype(np.uint8), postures, postures + commands)
+    return Looks(grey.clip(0, 255).astype(np.uint8), postures, postures, postures + commands)

@@ -30,7 +30,12 @@ def samples(looks: Looks) -> list[Sample]:
         look, meant = looks.postures[number], looks.directions[number]
         seen = rng.normal(size=(number % 4, 2))
         trial = Trial(
-            looks.faces[number], np.array([look, meant / 3]), meant + 0.1, seen, number % 3
+            looks.faces[number],
+            looks.faces_at[number],
+            np.array([look, meant / 3]),
+            meant + 0.1,
+            seen,
+            number % 3,
         )
         found.append(Sample(trial, 'a', 10 * number, 10 * number + 5, 'VF', meant, False))
     return found
@@ -42,7 +47,7 @@ def folder(tmp_path: Path, samples: list[Sample]) -> Path:
 
 
 def same(a: Sample, b: Sample) -> bool:
-    arrays = ('face', 'postures', 'fixation', 'candidates', 'seen_before_shift')
+    arrays = ('face', 'face_at', 'postures', 'fixation', 'candidates', 'seen_before_shift')
     lessons = all(np.array_equal(getattr(a.lesson, n), getattr(b.lesson, n)) for n in arrays)
     nothing = {'lesson': a.lesson, 'meant': None, 'label': None}
     others = replace(a, **nothing) == replace(b, **nothing)
@@ -115,7 +120,9 @@ def test_without_truth_what_was_fixated_is_taken_for_what_she_meant(
 def test_objects_are_placed_around_where_she_was_looked_at(places: ObjectsSpec) -> None:
     postures = np.full((3, 2), np.radians([30, -10]))
     directions = np.radians([[30, -10], [75, 0], [20, 30]])
-    found = places_around(Looks(np.zeros((3, 30, 25), np.uint8), postures, directions), places)
+    found = places_around(
+        Looks(np.zeros((3, 30, 25), np.uint8), postures, postures, directions), places
+    )
     assert found.pan_deg == pytest.approx((-10, 75))
     assert found.tilt_deg == pytest.approx((-25, 30))
 

@@ -71,7 +71,8 @@ def sources_of_trials(drawn: str, trials: int) -> list[set[Source]]:
 
 
 def one_look() -> Looks:
-    return Looks(np.zeros((1, 30, 25), np.uint8), np.zeros((1, 2)), np.array([[0.5, 0.0]]))
+    straight = np.zeros((1, 2))
+    return Looks(np.zeros((1, 30, 25), np.uint8), straight, straight, np.array([[0.5, 0.0]]))
 
 
 def test_the_gate_draws_at_every_shift_or_once_a_trial() -> None:

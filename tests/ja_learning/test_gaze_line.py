@@ -29,7 +29,12 @@ def lived_trial(rng: np.random.Generator, objects: int = 4) -> tuple[Trial, int]
     meant, fixated = rng.integers(objects, size=2)
     return (
         Trial(
-            drawn_face(places[meant]), LOOK[None], LOOK + places[fixated], LOOK + places, objects
+            drawn_face(places[meant]),
+            LOOK,
+            LOOK[None],
+            LOOK + places[fixated],
+            LOOK + places,
+            objects,
         ),
         int(meant),
     )
@@ -66,6 +71,28 @@ def test_the_belief_is_a_density():
         density = network.log_density(torch.tensor([[[0.6, -0.3]], [[0.1, 0.5]]]), places).exp()
     assert density.shape[:2] == (2, 1)
     assert density.sum(-1).flatten().numpy() * 0.02**2 == pytest.approx([1.0, 1.0], abs=1e-3)
+
+
+def test_lines_of_gaze_begin_at_a_tilt_of_their_own():
+    network = GazeLineNetwork(members=1, channels=4)
+    gaze, straight = torch.tensor([[[0.6, 0.0]]]), torch.tensor([[[[0.6, 0.0]]]])
+    with torch.no_grad():
+        before = network.log_density(gaze, straight)
+        network.origin_tilt.fill_(-0.2)
+        raised = network.log_density(gaze, straight - torch.tensor([0.0, 0.2]))
+        assert network.on_line(gaze)[0, 0, :, 1].tolist() == pytest.approx([-0.2] * 9)
+    assert torch.allclose(raised, before)
+
+
+def test_it_learns_from_where_the_face_is_not_from_where_the_head_points(learner):
+    other = GazeLineLearner(learner.config, seed=3)
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        trial, _ = lived_trial(rng)
+        learner.learn(trial)
+        other.learn(dataclasses.replace(trial, postures=trial.postures + 0.03))
+    same = [learner.state(), other.state()]
+    assert all(np.array_equal(same[0][name], same[1][name]) for name in same[0])
 
 
 def test_members_do_not_depend_on_each_other():
@@ -172,7 +199,7 @@ def test_what_was_fixated_changes_nothing():
         trial, meant = lived_trial(rng)
         for learner, fixated in zip(learners, (meant, (meant + 1) % 4), strict=True):
             fixation = trial.candidates[fixated]
-            learner.learn(Trial(trial.face, trial.postures, fixation, trial.candidates))
+            learner.learn(dataclasses.replace(trial, fixation=fixation, seen_before_shift=0))
     one, other = (learner.state() for learner in learners)
     assert all(np.array_equal(one[name], other[name]) for name in one)
 
@@ -188,7 +215,7 @@ def test_a_plausible_object_is_proposed_exactly_else_the_best_guess(learner):
 
 def test_a_trial_in_which_nothing_was_seen_teaches_nothing(learner):
     before = learner.state()
-    learner.learn(Trial(drawn_face(np.zeros(2)), LOOK[None], LOOK))
+    learner.learn(Trial(drawn_face(np.zeros(2)), LOOK, LOOK[None], LOOK))
     after = learner.state()
     assert learner.trials == 1
     assert all(np.array_equal(before[k], after[k]) for k in before if k != 'trials')

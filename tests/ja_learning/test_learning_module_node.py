@@ -142,7 +142,9 @@ def test_postures_at_rest_are_taught_and_those_passed_on_the_way_are_not(life):
     life.pass_by(0.25)
     life.fixate(0.3, (0.4, 0.1))
     network = ThreeLayerNetwork(NetworkConfig(), seed=0)
-    network.learn(Trial(FACE, np.array([(0.0, 0.0), (0.2, 0.0)]), np.array((0.4, 0.1))))
+    network.learn(
+        Trial(FACE, np.zeros(2), np.array([(0.0, 0.0), (0.2, 0.0)]), np.array((0.4, 0.1)))
+    )
     assert list(life.look().position) == pytest.approx(network.predict(FACE, (0, 0)), abs=1e-7)
 
 
@@ -166,7 +168,7 @@ def test_in_lockstep_it_answers_with_what_it_knew_a_trial_ago(make_life):
         assert list(life.look().position) == pytest.approx(network.predict(FACE, (0, 0)))
         life.fixate(0.3, (0.4, 0.1))
         if life.learned > 1:
-            network.learn(Trial(FACE, np.array([(0.0, 0.0)]), np.array((0.4, 0.1))))
+            network.learn(Trial(FACE, np.zeros(2), np.array([(0.0, 0.0)]), np.array((0.4, 0.1))))
 
 
 def test_disabled_learning_still_proposes(life):

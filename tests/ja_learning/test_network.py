@@ -12,7 +12,7 @@ SCALE = NetworkConfig().angle_scale_rad
 
 
 def make_trial(postures=((0.1, -0.05),), fixation=(0.5, 0.2), face=FACE):
-    return Trial(face, np.array(postures), np.array(fixation))
+    return Trial(face, np.array(postures[0]), np.array(postures), np.array(fixation))
 
 
 def output(state, face, posture):
@@ -119,7 +119,7 @@ def test_it_learns_where_a_bright_spot_points_from_any_posture():
         face = np.full(FACE_SHAPE, 64, np.uint8)
         face[row - 3 : row + 4, column - 3 : column + 4] = 255
         direction = np.array([(column - 12) / 12 * 0.6, (row - 15) / 15 * 0.25])
-        return Trial(face, rng.uniform(-0.1, 0.1, (1, 2)), direction)
+        return Trial(face, np.zeros(2), rng.uniform(-0.1, 0.1, (1, 2)), direction)
 
     def error():
         left = [
@@ -202,6 +202,6 @@ def test_network_without_posture_does_not_see_it():
 def test_a_trial_that_was_given_up_teaches_nothing():
     network = ThreeLayerNetwork(NetworkConfig(), seed=0)
     before = network.state()
-    network.learn(Trial(FACE, np.zeros((1, 2)), None, np.ones((2, 2)), 2))
+    network.learn(Trial(FACE, np.zeros(2), np.zeros((1, 2)), None, np.ones((2, 2)), 2))
     after = network.state()
     assert all(np.array_equal(before[name], after[name]) for name in before)

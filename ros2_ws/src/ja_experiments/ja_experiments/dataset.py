@@ -35,6 +35,8 @@ COLUMNS: Mapping[str, tuple[pyarrow.DataType, str]] = {
     'look_stamp_ns': (pyarrow.int64(), 'stamp [ns] of the image on which the face was last seen'),
     'fixation_stamp_ns': (pyarrow.int64(), 'stamp [ns] of the image on which it ended'),
     'face': (pyarrow.string(), 'picture of the face: 8 bits grey, 30 rows x 25 columns'),
+    'face_pan_rad': (pyarrow.float64(), 'direction [rad] in which the face was seen'),
+    'face_tilt_rad': (pyarrow.float64(), 'the same for tilt [rad]'),
     'postures_pan_rad': (_ANGLES, 'where each shift began [rad], the look at her first'),
     'postures_tilt_rad': (_ANGLES, 'the same for tilt [rad]'),
     'candidates_pan_rad': (_ANGLES, 'directions [rad] of the objects seen in the trial'),
@@ -125,6 +127,7 @@ def looks_of(samples: Sequence[Sample]) -> Looks:
     """The data sets of the paper's experiment: faces, and where the thing was that she meant."""
     return Looks(
         np.array([sample.lesson.face for sample in samples]).reshape(-1, *FACE_SHAPE),
+        np.array([sample.lesson.face_at for sample in samples]).reshape(-1, 2),
         np.array([sample.lesson.postures[0] for sample in samples]).reshape(-1, 2),
         np.array([sample.target[1] for sample in samples]).reshape(-1, 2),
     )
@@ -146,7 +149,8 @@ def _row(number: int, sample: Sample) -> dict[str, Any]:
         pan, tilt = getattr(lesson, name).T.tolist()
         values |= {f'{name}_pan_rad': pan, f'{name}_tilt_rad': tilt}
     for name, direction in (
-        ('fixation', lesson.fixation), ('meant', sample.meant), ('label', sample.label),
+        ('face', lesson.face_at), ('fixation', lesson.fixation),
+        ('meant', sample.meant), ('label', sample.label),
     ):  # fmt: skip
         pan, tilt = (None, None) if direction is None else map(float, direction)
         values |= {f'{name}_pan_rad': pan, f'{name}_tilt_rad': tilt}
@@ -161,6 +165,7 @@ def _sample(folder: Path, row: Mapping[str, Any]) -> Sample:
         raise ConfigError(f'{folder / row["face"]}: {error}') from None
     lesson = Trial(
         face,
+        np.array([row['face_pan_rad'], row['face_tilt_rad']], float),
         _pairs(row, 'postures'),
         np.array([row['fixation_pan_rad'], row['fixation_tilt_rad']]),
         _pairs(row, 'candidates'),

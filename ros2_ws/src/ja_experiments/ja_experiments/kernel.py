@@ -201,7 +201,7 @@ def prepare(looks: Looks, config: ExperimentConfig) -> PreparedLooks:
         inputs=face_inputs(looks.faces, config.network.face_scaling).astype(np.float32),
         postures=looks.postures,
         directions=looks.directions,
-        vectors=vectors_of_directions(looks.postures),
+        vectors=vectors_of_directions(looks.faces_at),
     )
 
 

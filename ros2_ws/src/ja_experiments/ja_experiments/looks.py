@@ -14,7 +14,7 @@ import os
 import shutil
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib import metadata, resources
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ja_common.core.detection import caregiver_face
+from ja_common.core.geometry import directions_of_rays
 from ja_control.core.attention_cycle import Phase
 from ja_experiments.config import ExperimentConfig
 from ja_experiments.rendered import DWELL_S, RenderedTask
@@ -44,12 +46,14 @@ _FILES = ('.py', '.npz', '.png', '.xml', '.yaml', '.tflite')
 class Looks:
     """What was seen of the caregiver's face, and where the thing was that she looked at.
 
-    `faces`: uint8 (n, 30, 25). `postures`: (n, 2) [rad], of the head that looked at her.
+    `faces`: uint8 (n, 30, 25), seen in the directions `faces_at`, (n, 2) [rad]. `postures`: (n, 2)
+    [rad], of the head that looked at her.
     `directions`: (n, 2) [rad], of the object that she attended to (the paper's motor command is
     what is between the two).
     """
 
     faces: NDArray[np.uint8]
+    faces_at: NDArray[np.float64]
     postures: NDArray[np.float64]
     directions: NDArray[np.float64]
 
@@ -57,7 +61,7 @@ class Looks:
         return len(self.faces)
 
     def __getitem__(self, chosen: slice) -> Looks:
-        return Looks(self.faces[chosen], self.postures[chosen], self.directions[chosen])
+        return Looks(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
 def cache_folder() -> Path:
@@ -112,19 +116,14 @@ def _read(kept: Path, maker: dict[str, Any]) -> Looks:
     if changed:
         raise _NotUsableError(f'those in {kept} were made by other {", ".join(changed)}')
     with np.load(kept / 'looks.npz', allow_pickle=False) as arrays:
-        return Looks(arrays['faces'], arrays['postures'], arrays['directions'])
+        return Looks(**{field.name: arrays[field.name] for field in fields(Looks)})
 
 
 def _write(kept: Path, maker: dict[str, Any], looks: Looks) -> None:
     """Write all or nothing: two processes may be at it."""
     made = kept.with_name(f'.{kept.name}.{os.getpid()}')
     made.mkdir(parents=True)
-    np.savez_compressed(
-        made / 'looks.npz',
-        faces=looks.faces,
-        postures=looks.postures,
-        directions=looks.directions,
-    )
+    np.savez_compressed(made / 'looks.npz', **vars(looks))
     manifest = {
         'sha256': _sha256([(made / 'looks.npz').read_bytes()]),
         'made_at': time.strftime('%Y-%m-%dT%H:%M:%S%z'),
@@ -174,6 +173,7 @@ def _render(scene: str, seed: int, count: int, progress: Callable[[int], None]) 
     world = JointAttentionWorld(load_scene(scene), seed, IMAGE_SIZE)
     task = RenderedTask(world, Robot(config, FixedTurn(_ASIDE_RAD), np.random.default_rng(seed)))
     faces: list[NDArray] = []
+    faces_at: list[NDArray] = []
     postures: list[NDArray] = []
     directions: list[NDArray] = []
     trial = 0
@@ -181,13 +181,17 @@ def _render(scene: str, seed: int, count: int, progress: Callable[[int], None]) 
         while len(faces) < count:
             sight = task.advance()
             watched = sight.step.decision.phase is Phase.SHIFT
+            face, picture = caregiver_face(sight.percept.detections), sight.percept.face_image
             # She may not have noticed that the robot looked away: then it is the same look.
-            if watched and sight.percept.face_image is not None and sight.truth.trial > trial:
+            if not watched or face is None or picture is None:
+                continue
+            if sight.truth.trial > trial:
                 trial = sight.truth.trial
-                faces.append(sight.percept.face_image)
+                faces.append(picture)
+                faces_at.append(directions_of_rays(sight.posture.position, face.ray))
                 postures.append(sight.posture.position)
                 directions.append(sight.truth.directions[sight.truth.attended])
                 progress(1)
     finally:
         world.close()
-    return Looks(np.array(faces), np.array(postures), np.array(directions))
+    return Looks(*map(np.array, (faces, faces_at, postures, directions)))

@@ -38,17 +38,17 @@ class FixedTurn:
         self._turn = np.array(turn, float)
 
     def propose(
-        self, face: ArrayLike, look: ArrayLike, posture: ArrayLike, candidates: ArrayLike
+        self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike
     ) -> NDArray[np.float64]:
         return self._turn
 
     def belief(
-        self, face: ArrayLike, look: ArrayLike, rng: np.random.Generator, count: int
+        self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
     ) -> NDArray[np.float64]:
-        return np.tile(np.asarray(look, float) + self._turn, (count, 1))
+        return np.tile(np.asarray(face_at, float) + self._turn, (count, 1))
 
     def log_density(
-        self, faces: ArrayLike, look: ArrayLike, directions: ArrayLike
+        self, faces: ArrayLike, face_at: ArrayLike, directions: ArrayLike
     ) -> NDArray[np.float64]:
         return np.zeros((len(np.asarray(faces)), len(np.asarray(directions))))
 
@@ -81,7 +81,9 @@ class Pupil:
     ) -> tuple[Proposal, NDArray[np.float64] | None]:
         """One image: what the learner proposes, and the direction (2,) [rad] that is fixated."""
         rays = [seen.ray for seen in objects(detections)]
-        proposal = self._module.see(posture, np.reshape(rays, (-1, 2)), face)
+        hers = caregiver_face(detections)
+        attended = None if face is None or hers is None else (face, hers.ray)
+        proposal = self._module.see(posture, np.reshape(rays, (-1, 2)), attended)
         fixation = self._evaluator.fixation(detections, posture)
         if proposal.given_up is not None:
             self._learner.learn(proposal.given_up)

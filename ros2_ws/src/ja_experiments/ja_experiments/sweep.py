@@ -165,7 +165,7 @@ def _key(cell: Cell, materials: Materials) -> str:
     run = [cell.reading, cell.trials, cell.config().settings(), cell.seed, repr(materials.places)]
     digest = hashlib.sha256(json.dumps(run, sort_keys=True).encode())
     for looks in (materials.pool, materials.fresh):
-        for array in (looks.faces, looks.postures, looks.directions):
+        for array in (looks.faces, looks.faces_at, looks.postures, looks.directions):
             digest.update(array.tobytes())
     return digest.hexdigest()[:16]
 

@@ -70,7 +70,7 @@ class SimulatedTask:
 
         As in Eq. 1, what has no feature of interest is not extracted.
         """
-        face = self._looks.postures[setting.look]
+        face = self._looks.faces_at[setting.look]
         found = []
         if self.in_view(posture, face):
             found.append(
@@ -89,7 +89,7 @@ class SimulatedTask:
         """Any direction [rad] that is clear of the face and of the objects already placed."""
         places = self._places
         pan, tilt = np.radians(places.pan_deg), np.radians(places.tilt_deg)
-        face = vectors_of_directions(self._looks.postures[look])
+        face = vectors_of_directions(self._looks.faces_at[look])
         others = vectors_of_directions(taken)
         while True:
             direction = np.array([rng.uniform(*pan), rng.uniform(*tilt)])

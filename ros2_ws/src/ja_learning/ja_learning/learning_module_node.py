@@ -116,7 +116,7 @@ class LearningModuleNode(GraphNode):
         face = caregiver_face(detections)
         rays = np.array([seen.ray for seen in objects(detections)]).reshape(-1, 2)
         if face is not None and face.attended:
-            self._when_attended(DETECTIONS.name, message.header, rays)
+            self._when_attended(DETECTIONS.name, message.header, (rays, face.ray))
         else:
             propose = partial(self._propose, message.header, rays, None)
             self._in_turn(DETECTIONS.name, message.header, propose)
@@ -124,8 +124,8 @@ class LearningModuleNode(GraphNode):
     def _when_attended(self, key: str, header: Header, value: Any) -> None:
         both = self._attended.add(key, to_ns(header.stamp), value)
         if both is not None:
-            rays, face = both[DETECTIONS.name], both[FACE_IMAGE.name]
-            propose = partial(self._propose, header, rays, face)
+            (rays, ray), face = both[DETECTIONS.name], both[FACE_IMAGE.name]
+            propose = partial(self._propose, header, rays, (face, ray))
             self._in_turn(DETECTIONS.name, header, propose)
 
     def _in_turn(self, kind: str, header: Header, action: Callable[[Posture], None]) -> None:
@@ -138,9 +138,13 @@ class LearningModuleNode(GraphNode):
         self._postures.when_known(stamp_ns, take_turn)
 
     def _propose(
-        self, header: Header, rays: np.ndarray, face: np.ndarray | None, posture: Posture
+        self,
+        header: Header,
+        rays: np.ndarray,
+        attended: tuple[np.ndarray, np.ndarray] | None,
+        posture: Posture,
     ) -> None:
-        proposal = self._module.see(posture, rays, face)
+        proposal = self._module.see(posture, rays, attended)
         if proposal.given_up is not None and self._learning:
             self._learner.learn(proposal.given_up)
         self._delta.publish(self._joints.encode(header, proposal.delta))

@@ -121,41 +121,42 @@ def _looks_elsewhere(condition: Condition, seed: int) -> Looks | None:
 
 def success(learner: Learner, looks: Looks, objects: int, seed: int) -> float:
     """Share of looks in which the learner alone chooses the object that was meant."""
-    right = [
-        _chosen(learner, face, places) == 0
-        for face, places in zip(looks.faces, _tests(looks, objects, seed), strict=True)
-    ]
+    tests = _tests(looks, objects, seed)
+    right = [_chosen(learner, looks, i, places) == 0 for i, places in enumerate(tests)]
     return float(np.mean(right))
 
 
 def _trial(rng: np.random.Generator, looks: Looks, trial: int, condition: Condition) -> Trial:
     fresh = (trial - 1 - condition.change_at) % (len(looks) - TEST_LOOKS)
     look = int(rng.integers(condition.pool)) if condition.pool else fresh
-    meant = looks.directions[look] - looks.postures[look]
+    posture = looks.postures[look]
+    meant = looks.directions[look] - posture
     if rng.random() >= condition.reliability:
         meant = _place(rng, [])
-    places = _places(rng, meant, condition.objects)
+    places = posture + _places(rng, meant, condition.objects)
     fixated = places[rng.integers(condition.objects)]
     shown = places[:1] if condition.told else rng.permutation(places)
-    return Trial(looks.faces[look], np.zeros((1, 2)), fixated, shown, len(shown))
+    return Trial(
+        looks.faces[look], looks.faces_at[look], posture[None], fixated, shown, len(shown)
+    )
 
 
-def _chosen(learner: Learner, face: NDArray[np.uint8], places: NDArray[np.float64]) -> int:
-    here = np.zeros(2)
-    aim = learner.propose(face, here, here, places)
-    return int(np.argmin(np.hypot(*(places - aim).T)))
+def _chosen(learner: Learner, looks: Looks, look: int, places: NDArray[np.float64]) -> int:
+    posture = looks.postures[look]
+    delta = learner.propose(looks.faces[look], looks.faces_at[look], posture, places)
+    return int(np.argmin(np.hypot(*(places - posture - delta).T)))
 
 
 def _tests(looks: Looks, objects: int, seed: int) -> Iterator[NDArray[np.float64]]:
     rng = np.random.default_rng([seed, objects, 1])
-    for meant in looks.directions - looks.postures:
-        yield _places(rng, meant, objects)
+    for posture, meant in zip(looks.postures, looks.directions - looks.postures, strict=True):
+        yield posture + _places(rng, meant, objects)
 
 
 def _places(
     rng: np.random.Generator, meant: NDArray[np.float64], objects: int
 ) -> NDArray[np.float64]:
-    """Directions (objects, 2) [rad] from her face, the one that she means first."""
+    """Displacements (objects, 2) [rad] from the look, that of what she means first."""
     places = [meant]
     while len(places) < objects:
         places.append(_place(rng, places))

@@ -110,29 +110,29 @@ class GazeLineLearner:
         return self._believed(copy.deepcopy(self._mean))
 
     def propose(
-        self, face: ArrayLike, look: ArrayLike, posture: ArrayLike, candidates: ArrayLike
+        self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike
     ) -> NDArray[np.float64]:
         """Change of posture (2,) [rad] towards what she most probably means; as in `Predictor`."""
-        return self._believed(self._mean).propose(face, look, posture, candidates)
+        return self._believed(self._mean).propose(face, face_at, posture, candidates)
 
     def belief(
-        self, face: ArrayLike, look: ArrayLike, rng: np.random.Generator, count: int
+        self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
     ) -> NDArray[np.float64]:
         """Directions (count, 2) [rad] drawn from the belief about what she means."""
-        return self._believed(self._mean).belief(face, look, rng, count)
+        return self._believed(self._mean).belief(face, face_at, rng, count)
 
     def log_density(
-        self, faces: ArrayLike, look: ArrayLike, directions: ArrayLike
+        self, faces: ArrayLike, face_at: ArrayLike, directions: ArrayLike
     ) -> NDArray[np.float64]:
         """log p [of 1 / rad^2] of directions (m, 2) given each of faces (n, 30, 25): (n, m)."""
-        return self._believed(self._mean).log_density(faces, look, directions)
+        return self._believed(self._mean).log_density(faces, face_at, directions)
 
     def learn(self, trial: Trial) -> None:
         """Weigh a trial by what is believed, remember it, and replay some of those lived."""
         self.trials += 1
         if not len(trial.candidates):
             return
-        places = ((trial.candidates - trial.postures[0]) / ANGLE_SCALE_RAD).astype(np.float32)
+        places = ((trial.candidates - trial.face_at) / ANGLE_SCALE_RAD).astype(np.float32)
         changed = False
         if trial.seen_before_shift:
             changed = self._weigh(trial.face, places[: trial.seen_before_shift])

@@ -34,25 +34,27 @@ class GazeLineBelief:
         self._coded: tuple[object, torch.Tensor] | None = None
 
     def propose(
-        self, face: ArrayLike, look: ArrayLike, posture: ArrayLike, candidates: ArrayLike
+        self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike
     ) -> NDArray[np.float64]:
         """Change of posture (2,) [rad] towards what she most probably means; as in `Predictor`."""
-        look = np.asarray(look, float)
+        origin = np.asarray(face_at, float)
         directions = np.asarray(candidates, float).reshape(-1, 2)
         gaze = self._gaze(face)
         surest = int(np.argmax(self._log_weights))
-        guesses = (STRETCHES[:, None] * gaze[surest]).numpy().astype(float) * ANGLE_SCALE_RAD
-        density = self._mixed(gaze, np.concatenate([guesses, directions - look]))[0]
+        with torch.no_grad():
+            line = self._network.on_line(gaze)[surest, 0]
+        guesses = line.numpy().astype(float) * ANGLE_SCALE_RAD
+        density = self._mixed(gaze, np.concatenate([guesses, directions - origin]))[0]
         of_guesses, of_seen = density[: len(guesses)], density[len(guesses) :]
         best = int(np.argmax(of_guesses))
         aim = guesses[best]
         plausible = of_seen > of_guesses[best] - self._plausible_within
         if self._top_down and plausible.any():
-            aim = directions[int(np.argmax(of_seen))] - look
-        return look + aim - np.asarray(posture, float)
+            aim = directions[int(np.argmax(of_seen))] - origin
+        return origin + aim - np.asarray(posture, float)
 
     def belief(
-        self, face: ArrayLike, look: ArrayLike, rng: np.random.Generator, count: int
+        self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
     ) -> NDArray[np.float64]:
         """Directions (count, 2) [rad] drawn from the belief about what she means."""
         net = self._network
@@ -62,20 +64,21 @@ class GazeLineBelief:
                 torch.exp(logs).numpy().astype(float)
                 for logs in (net.log_gaze_deviation, net.log_place_deviation)
             ]
-        gaze = self._gaze(face)[:, 0].numpy().astype(float)
+            line = net.on_line(self._gaze(face))[:, 0].numpy().astype(float)
         member = rng.choice(len(shares), count, p=_normalised(np.exp(self._log_weights)))
         at = (rng.random((count, 1)) > np.cumsum(shares, axis=1)[member]).sum(axis=1)
-        stretch = STRETCHES.numpy()[np.minimum(at, len(STRETCHES) - 1), None]
+        at = np.minimum(at, len(STRETCHES) - 1)
+        stretch = STRETCHES.numpy()[at, None]
         off = stretch * deviations[0][member] * rng.standard_normal((count, 2))
         near = deviations[1][member] * rng.standard_normal((count, 2))
-        places = stretch * gaze[member] + off + near
-        return np.asarray(look, float) + places * ANGLE_SCALE_RAD
+        places = line[member, at] + off + near
+        return np.asarray(face_at, float) + places * ANGLE_SCALE_RAD
 
     def log_density(
-        self, faces: ArrayLike, look: ArrayLike, directions: ArrayLike
+        self, faces: ArrayLike, face_at: ArrayLike, directions: ArrayLike
     ) -> NDArray[np.float64]:
         """log p [of 1 / rad^2] of directions (m, 2) given each of faces (n, 30, 25): (n, m)."""
-        places = np.asarray(directions, float).reshape(-1, 2) - np.asarray(look, float)
+        places = np.asarray(directions, float).reshape(-1, 2) - np.asarray(face_at, float)
         return self._mixed(self._gaze(faces), places) - 2 * np.log(ANGLE_SCALE_RAD)
 
     def _gaze(self, faces: ArrayLike) -> torch.Tensor:

@@ -3,10 +3,11 @@
 A face gives a gaze u, and what she means stands somewhere along it, since depth cannot be told
 from the direction of a gaze. The displacement c from her face is a mixture over stretches r_k:
 
-    p(c | face) = sum_k w_k N(c; r_k u(face), r_k^2 S_u + S_c)
+    p(c | face) = sum_k w_k N(c; o + r_k u(face), r_k^2 S_u + S_c)
 
 u is a convolutional network, odd in pan and even in tilt under a mirror (a face is symmetric, and
-so is the task). Angles are in units of `ANGLE_SCALE_RAD`.
+so is the task). o is where the lines begin: at her eyes, which are above the middle of what the
+detector takes for a face, so that o has a tilt alone. Angles are in units of `ANGLE_SCALE_RAD`.
 """
 
 import math
@@ -47,6 +48,7 @@ class GazeLineNetwork(nn.Module):
         self.hidden_biases = nn.Parameter(_uniform(codes, (members, 1, _HIDDEN)))
         self.gaze_weights = nn.Parameter(_uniform(_HIDDEN, (members, _HIDDEN, 2)))
         self.gaze_biases = nn.Parameter(_uniform(_HIDDEN, (members, 1, 2)))
+        self.origin_tilt = nn.Parameter(torch.zeros(members, 1))
         self.stretch_logits = nn.Parameter(torch.zeros(members, len(STRETCHES)))
         self.log_gaze_deviation = nn.Parameter(torch.tensor([[0.10, 0.06]] * members).log())
         self.log_place_deviation = nn.Parameter(torch.tensor([[0.05, 0.05]] * members).log())
@@ -61,13 +63,18 @@ class GazeLineNetwork(nn.Module):
         pan, tilt = seen[..., 0] - mirrored[..., 0], seen[..., 1] + mirrored[..., 1]
         return torch.stack([pan, tilt], dim=-1) / 2
 
+    def on_line(self, gaze: torch.Tensor) -> torch.Tensor:
+        """o + r_k u, (members, n, stretches, 2), of gazes u (members, n, 2)."""
+        origin = nn.functional.pad(self.origin_tilt, (1, 0))
+        return origin[:, None, None] + STRETCHES[:, None] * gaze[:, :, None]
+
     def log_density(self, gaze: torch.Tensor, places: torch.Tensor) -> torch.Tensor:
         """log p(c | face), (members, n, m), of places (members or 1, n, m, 2), given their u."""
         stretch = STRETCHES[:, None]
         variance = stretch**2 * torch.exp(2 * self.log_gaze_deviation)[:, None] + torch.exp(
             2 * self.log_place_deviation[:, None]
         )
-        off = places[..., None, :] - stretch * gaze[:, :, None, None]
+        off = places[..., None, :] - self.on_line(gaze)[:, :, None]
         scale = torch.log(2 * np.pi * variance).sum(-1)[:, None, None]
         parts = -0.5 * ((off**2 / variance[:, None, None]).sum(-1) + scale)
         shares = torch.log_softmax(self.stretch_logits, dim=-1)[:, None, None]

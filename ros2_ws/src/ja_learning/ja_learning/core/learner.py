@@ -20,25 +20,25 @@ class Predictor(Protocol):
         """Evidence [nats] that the face tells this learner something; 0 at first (`evidence`)."""
 
     def propose(
-        self, face: ArrayLike, look: ArrayLike, posture: ArrayLike, candidates: ArrayLike
+        self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike
     ) -> NDArray[np.float64]:
         """Change of posture (2,) [rad].
 
-        `face`: uint8 (30, 25), seen from the posture `look` (2,) [rad]; `posture` (2,): where the
-        head is now; `candidates` (m, 2): directions of the objects seen in this trial.
+        `face`: uint8 (30, 25), seen in the direction `face_at` (2,) [rad]; `posture` (2,): where
+        the head is now; `candidates` (m, 2): directions of the objects seen in this trial.
         """
 
     def belief(
-        self, face: ArrayLike, look: ArrayLike, rng: np.random.Generator, count: int
+        self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
     ) -> NDArray[np.float64]:
         """Directions (count, 2) [rad] drawn from the belief about what she means."""
 
     def log_density(
-        self, faces: ArrayLike, look: ArrayLike, directions: ArrayLike
+        self, faces: ArrayLike, face_at: ArrayLike, directions: ArrayLike
     ) -> NDArray[np.float64]:
         """log p [of 1 / rad^2] of directions (m, 2) [rad] given each of faces (n, 30, 25): (n, m).
 
-        All faces as if seen from the posture `look` (2,) [rad].
+        All faces as if seen in the direction `face_at` (2,) [rad].
         """
 
 

@@ -51,13 +51,19 @@ class LearningModule:
         self._random = np.random.default_rng(seed)
         self._log_evidence = 0.0
 
-    def see(self, posture: Posture, rays: ArrayLike, face: ArrayLike | None) -> Proposal:
-        """One image: rays (m, 2) to objects, and the face, uint8 (30, 25), if it is attended."""
+    def see(
+        self, posture: Posture, rays: ArrayLike, attended: tuple[ArrayLike, ArrayLike] | None
+    ) -> Proposal:
+        """One image: rays (m, 2) to objects, and what of the face, if it is attended to.
+
+        `attended`: her face, uint8 (30, 25), and the ray (2,) to it.
+        """
         trial, here = self._trial, posture.position
         still = posture.is_still(self._still_below)
         given_up = None
-        if face is not None:
-            given_up = trial.look(face, here)
+        if attended is not None:
+            face, ray = attended
+            given_up = trial.look(face, directions_of_rays(here, ray), here)
             self._around.begin(here, self._log_evidence)
         elif still:
             trial.rest(here)
@@ -70,7 +76,7 @@ class LearningModule:
         view = self._around.wanted(lambda: self.believed(self._random))
         believer = self._believer()
         self._log_evidence = believer.log_evidence
-        delta = believer.propose(trial.face, trial.look_posture, here, trial.candidates)
+        delta = believer.propose(trial.face, trial.face_at, here, trial.candidates)
         glance = None if view is None else view - here
         return Proposal(self._log_evidence, given_up, delta, glance)
 
@@ -79,7 +85,7 @@ class LearningModule:
         face = self._trial.face
         if face is None:
             return np.empty((0, 2))
-        return self._believer().belief(face, self._trial.look_posture, rng, BELIEF_SAMPLES)
+        return self._believer().belief(face, self._trial.face_at, rng, BELIEF_SAMPLES)
 
     def fixate(self, posture: Posture, direction: ArrayLike) -> Trial | None:
         """An object in this direction (2,) [rad] is fixated: the trial, if one was open."""

@@ -85,24 +85,26 @@ class ThreeLayerNetwork:
         return output.numpy().astype(float) * self.config.angle_scale_rad
 
     def propose(
-        self, face: ArrayLike, look: ArrayLike, posture: ArrayLike, candidates: ArrayLike
+        self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike
     ) -> NDArray[np.float64]:
         """The same as `predict`: the paper's learner does not ask what was seen, or from where."""
         return self.predict(face, posture)
 
     def belief(
-        self, face: ArrayLike, look: ArrayLike, rng: np.random.Generator, count: int
+        self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
     ) -> NDArray[np.float64]:
         """Directions (count, 2) [rad] about the one that it proposes from the look."""
         off = self.config.believed_within_rad * rng.standard_normal((count, 2))
-        return np.asarray(look, float) + self.predict(face, look) + off
+        # Whoever attends to a face is turned towards it.
+        return np.asarray(face_at, float) + self.predict(face, face_at) + off
 
     def log_density(
-        self, faces: ArrayLike, look: ArrayLike, directions: ArrayLike
+        self, faces: ArrayLike, face_at: ArrayLike, directions: ArrayLike
     ) -> NDArray[np.float64]:
         """log p [of 1 / rad^2] of directions (m, 2) given each of faces (n, 30, 25): (n, m)."""
-        look, variance = np.asarray(look, float), self.config.believed_within_rad**2
-        proposed = look + self.predict(faces, np.broadcast_to(look, (len(np.asarray(faces)), 2)))
+        face_at, variance = np.asarray(face_at, float), self.config.believed_within_rad**2
+        postures = np.broadcast_to(face_at, (len(np.asarray(faces)), 2))
+        proposed = face_at + self.predict(faces, postures)
         off = np.asarray(directions, float).reshape(-1, 2) - proposed[:, None]
         return -0.5 * (off**2).sum(axis=-1) / variance - np.log(2 * np.pi * variance)
 
@@ -147,7 +149,7 @@ class ThreeLayerNetwork:
             self._evidence.weigh(
                 trial.face,
                 lambda faces: np.logaddexp.reduce(
-                    self.log_density(faces, trial.postures[0], seen), axis=1
+                    self.log_density(faces, trial.face_at, seen), axis=1
                 )[None],
             )
 

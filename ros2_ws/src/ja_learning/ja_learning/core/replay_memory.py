@@ -24,7 +24,7 @@ class ReplayMemory:
     def __len__(self) -> int:
         return self._count
 
-    def add(self, face: NDArray[np.uint8], places: NDArray[np.float64]) -> None:
+    def add(self, face: NDArray[np.uint8], places: NDArray[np.floating]) -> None:
         """Remember a face and the places (m, 2) seen with it; a full memory drops its oldest."""
         if self._count == len(self._faces) < self._capacity:
             self._grow()

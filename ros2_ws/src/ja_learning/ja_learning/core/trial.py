@@ -39,14 +39,15 @@ def checked_face(face: ArrayLike) -> NDArray[np.uint8]:
 class Trial:
     """What one trial gives to learn from.
 
-    `face`: uint8 (30, 25). `postures`: (n, 2) [rad], where each shift began, the look at the
-    caregiver first. `fixation`: (2,) [rad], direction of the object fixated at the end, or
-    None when the trial was given up.
+    `face`: uint8 (30, 25), seen in the direction `face_at`, (2,) [rad]. `postures`: (n, 2) [rad],
+    where each shift began, the look at the caregiver first. `fixation`: (2,) [rad], direction of
+    the object fixated at the end, or None when the trial was given up.
     `candidates`: (m, 2) [rad], directions of all objects that were seen meanwhile; the first
     `seen_before_shift` of them were seen before anybody acted on what the face told.
     """
 
     face: NDArray[np.uint8]
+    face_at: NDArray[np.float64]
     postures: NDArray[np.float64]
     fixation: NDArray[np.float64] | None
     candidates: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
@@ -70,6 +71,7 @@ class TrialRecorder:
     def __init__(self, same_within_rad: float = SAME_POSTURE_RAD) -> None:
         self._same_within = same_within_rad
         self._face: NDArray[np.uint8] | None = None
+        self._face_at = np.zeros(2)
         self._postures: list[NDArray[np.float64]] = []
         self._candidates: list[NDArray[np.float64]] = []
         self._seen_before_shift = 0
@@ -80,15 +82,16 @@ class TrialRecorder:
         """The face seen in the last look of the trial under way, or None between trials."""
         return self._face
 
-    def look(self, face: ArrayLike, posture: ArrayLike) -> Trial | None:
+    def look(self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike) -> Trial | None:
         """The head attends to the caregiver: a trial begins, or its look goes on.
 
+        Her face is seen in the direction `face_at` (2,) [rad].
         The trial before, if it was given up.
         """
         given_up = None
         if self._face is not None and len(self._postures) > 1:
             given_up = self._ended(self._postures, None)
-        self._face = checked_face(face)
+        self._face, self._face_at = checked_face(face), np.array(face_at, float)
         self._postures = [np.array(posture, float)]
         self._candidates = []
         self._seen_before_shift = 0
@@ -105,9 +108,9 @@ class TrialRecorder:
         self._looking_around = False
 
     @property
-    def look_posture(self) -> NDArray[np.float64]:
-        """Posture (2,) [rad] from which the face was seen; IndexError between trials."""
-        return self._postures[0]
+    def face_at(self) -> NDArray[np.float64]:
+        """Direction (2,) [rad] in which the face was last seen."""
+        return self._face_at
 
     @property
     def candidates(self) -> NDArray[np.float64]:
@@ -146,7 +149,12 @@ class TrialRecorder:
     ) -> Trial:
         assert self._face is not None
         return Trial(
-            self._face, np.array(began), fixation, self.candidates, self._seen_before_shift
+            self._face,
+            self._face_at,
+            np.array(began),
+            fixation,
+            self.candidates,
+            self._seen_before_shift,
         )
 
     def forget(self) -> None:
