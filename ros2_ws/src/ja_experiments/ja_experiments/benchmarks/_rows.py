@@ -1,10 +1,12 @@
-"""A figure from a share of successes in several independent lives."""
+"""Figures from shares of successes: of one series of trials, or in several independent lives."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
+from scipy.stats import binomtest
 
 from ja_experiments.estimate import over_seeds
 
@@ -17,4 +19,16 @@ def success_row(shares: ArrayLike) -> dict[str, Any]:
         'unit': 'success',
         'n': estimate.n,
         'interval': [estimate.low, estimate.high],
+    }
+
+
+def share_row(hits: ArrayLike) -> dict[str, Any]:
+    """Share of independent trials that succeeded, of bools (n,), and its 95 % interval."""
+    hits = np.asarray(hits)
+    result = binomtest(int(hits.sum()), len(hits)).proportion_ci(method='wilson')
+    return {
+        'value': float(hits.mean()),
+        'unit': 'share',
+        'n': len(hits),
+        'interval': [float(result.low), float(result.high)],
     }

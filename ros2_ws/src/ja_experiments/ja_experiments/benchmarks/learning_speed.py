@@ -3,10 +3,10 @@
 A fresh look every trial, each seed another caregiver; everything that was seen is a candidate, and
 the learner alone chooses among the objects of 500 looks that it never learned from. The paper's
 network learns from the object that it happened to fixate, drawn among all that were seen, as in
-its first stage; of its proposal the nearest object is taken. Two ceilings stand beside them: that
-of `./ja bench world`, for whoever sees exactly where her eyes point, and what the fast learner
-reaches if it is told what she means, which no robot is: the most that its networks get from as
-many pictures of her face.
+its first stage; of its proposal the nearest object is taken. Ceilings stand beside them: those of
+`./ja bench world`, for whoever sees exactly where her eyes point, or her head alone, and what the
+fast learner reaches if it is told what she means, which no robot is: the most that its networks
+get from as many pictures of her face.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ja_experiments.benchmarks._ceiling import ceiling
 from ja_experiments.benchmarks._rows import success_row
-from ja_experiments.benchmarks.world import ceiling
 from ja_experiments.looks import POOL, Looks, load_looks
 from ja_experiments.processes import side_by_side
 from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner

@@ -13,16 +13,14 @@ from typing import Any
 
 import cv2
 import numpy as np
-from scipy.stats import binomtest
 
-from ja_common.core.geometry import angle_between, directions_of_vectors
+from ja_experiments.benchmarks._ceiling import ceiling
 from ja_experiments.benchmarks._centerface import CenterFace
+from ja_experiments.benchmarks._rows import share_row
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.box import Box
 from ja_perception.core.face_crop import crop_face
 from ja_sim.core.caregiver import identities
-from ja_sim.core.gaze import missed
-from ja_sim.core.objects import Arrangement
 from ja_sim.core.scene import Scene, load_scene
 from ja_sim.core.specs import HEAD_PRESETS
 from ja_sim.core.world import JointAttentionWorld
@@ -64,7 +62,7 @@ def detection(seeds: int = 2) -> dict[str, Row]:
                     _is_face(find(picture), picture)
                     for picture in _turned_faces(size, turn, seeds)
                 ]
-                rows[f'{name} at {turn} deg, {size[0]}x{size[1]}'] = _share(found)
+                rows[f'{name} at {turn} deg, {size[0]}x{size[1]}'] = share_row(found)
     return rows
 
 
@@ -92,34 +90,6 @@ def head_pose(looks_per_person: int = 250) -> dict[str, Row]:
         for split, error in errors.items()
         for i, axis in enumerate(('yaw', 'pitch'))
     }
-
-
-def ceiling(trials: int = 8000) -> dict[str, Row]:
-    """Success of who sees exactly where her eyes point, but not how far along it the object is.
-
-    Her eyes miss what she looks at by a little, as the scene says.
-    Either by asking of every object how near it is to the line of gaze, or, as a network with one
-    pair of outputs must, by turning the gaze into the most likely direction first.
-    """
-    rows = {}
-    for count in (5, 10):
-        scene = load_scene('default')
-        scene = dataclasses.replace(scene, objects=dataclasses.replace(scene.objects, count=count))
-        # She attends to the first of each row; the order of drawing means nothing.
-        positions = _arrangements(scene, trials)
-        directions = directions_of_vectors(positions)
-        looked_at = _looked_at(scene, positions[:, 0])
-        lines = directions_of_vectors(_along_gaze(scene, looked_at))
-        off_line = angle_between(lines[:, None], directions[:, :, None]).min(axis=2)
-        rows[f'ceiling, {count} objects, nearest to the line of gaze'] = _share(
-            off_line.argmin(axis=1) == 0
-        )
-        guess = _one_guess(directions_of_vectors(_face(scene) - looked_at), directions[:, 0])
-        off_guess = angle_between(guess[:, None], directions)
-        rows[f'ceiling, {count} objects, nearest to one guess'] = _share(
-            off_guess.argmin(axis=1) == 0
-        )
-    return rows
 
 
 def looks(world: JointAttentionWorld, count: int) -> Iterator[np.ndarray]:
@@ -258,55 +228,6 @@ def _on_head(preset: str) -> Scene:
     return dataclasses.replace(load_scene('default'), name=preset, head=HEAD_PRESETS[preset])
 
 
-def _face(scene: Scene) -> np.ndarray:
-    return np.array([scene.caregiver.distance_m, 0.0, 0.0])
-
-
-def _arrangements(scene: Scene, trials: int) -> np.ndarray:
-    """Positions of the objects (T, N, 3) [m] as the world draws them."""
-    arrangement = Arrangement(scene.objects, _face(scene), np.random.default_rng(0))
-    places = []
-    for _ in range(trials):
-        arrangement.rearrange()
-        places.append([thing.position for thing in arrangement.things])
-    return np.array(places)
-
-
-def _looked_at(scene: Scene, attended: np.ndarray) -> np.ndarray:
-    """Where her eyes point (T, 3) [m] when she attends to things at (T, 3) [m]."""
-    rng, deviation = np.random.default_rng(1), np.radians(scene.caregiver.gaze_noise_deg)
-    eyes = np.broadcast_to(_face(scene), (2, 3))
-    return np.array([missed(each, eyes, rng.normal(0.0, deviation, 2)) for each in attended])
-
-
-def _one_guess(gaze: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """Mean direction (T, 2) of what is attended to, given the gaze (T, 2): a cubic fit."""
-    yaw, pitch = gaze.T
-    powers = [yaw**i * pitch**j for i in range(4) for j in range(4 - i)]
-    features = np.stack(powers, axis=1)
-    return features @ np.linalg.lstsq(features, directions, rcond=None)[0]
-
-
-def _along_gaze(scene: Scene, attended: np.ndarray, steps: int = 60) -> np.ndarray:
-    """Points (T, steps, 3) [m] of each line of gaze at which the scene allows an object.
-
-    The ends are where the line leaves the shell of allowed distances from the robot.
-    """
-    face = _face(scene)
-    along = attended - face
-    along = along / np.linalg.norm(along, axis=1, keepdims=True)
-    depth = np.linspace(0.0, 2.0 * scene.caregiver.distance_m, 400)[None, :, None]
-    points = face + depth * along[:, None]
-    low, high = scene.objects.distance_m
-    distance = np.linalg.norm(points, axis=2)
-    lines = []
-    for line, allowed in zip(points, (distance > low) & (distance < high), strict=True):
-        first = np.argmax(allowed)  # the near side only: beyond it she would look past the robot
-        last = first + np.argmin(np.append(allowed[first:], False))
-        lines.append(line[np.linspace(first, last - 1, steps).round().astype(int)])
-    return np.array(lines)
-
-
 def _times(call: Callable[[], object], count: int) -> np.ndarray:
     """Processor time [s] of each call, after one that does not count.
 
@@ -330,14 +251,3 @@ def _mean(values: np.ndarray, unit: str) -> Row:
     mean, error = float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(len(values)))
     interval = [mean - 1.96 * error, mean + 1.96 * error]
     return {'value': mean, 'unit': unit, 'n': len(values), 'interval': interval}
-
-
-def _share(hits: Any) -> Row:
-    hits = np.asarray(hits)
-    result = binomtest(int(hits.sum()), len(hits)).proportion_ci(method='wilson')
-    return {
-        'value': float(hits.mean()),
-        'unit': 'share',
-        'n': len(hits),
-        'interval': [float(result.low), float(result.high)],
-    }
