@@ -114,6 +114,7 @@ class SimNode(GraphNode):
         self.offer(Trigger, 'sim/rearrange', self._on_rearrange)
 
         self._command: NDArray[np.float64] | None = None
+        self._was_answered = False
         self._ahead = self._config.lockstep and self._config.draw_ahead
         self._drawn = self._draw()
         self._round = self._next_round()
@@ -139,7 +140,7 @@ class SimNode(GraphNode):
         posture = self._joints.decode_posture(message)
         if posture is None:
             raise ValueError('a command names no joints')
-        self._command = posture
+        self._command, self._was_answered = posture, True
         self._pace.answer()
         self._go_on()
 
@@ -179,7 +180,8 @@ class SimNode(GraphNode):
         stands = self._config.lockstep or self._pace.paused
         if silent_s < self._config.resend_after_s or not stands:
             return
-        if math.isfinite(silent_s) and not self._pace.answered:
+        # While the robot starts nothing is lost; `joint_commands` says if it never comes.
+        if self._was_answered and not self._pace.answered:
             text = 'no command came for the last image; sending it again'
             self.problem('lockstep', text, Level.WARN)
         self._publish()
