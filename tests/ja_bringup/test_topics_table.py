@@ -18,13 +18,20 @@ def test_a_graph_is_listed_with_rates_and_purposes(ros_context):
     node.create_timer(0.02, lambda: often.publish(DETECTIONS.type()))
     executor = SingleThreadedExecutor(context=ros_context)
     executor.add_node(node)
-    thread = threading.Thread(target=executor.spin, daemon=True)
+    ended = threading.Event()
+
+    def spin():
+        while not ended.is_set():
+            executor.spin_once(timeout_sec=0.1)
+
+    thread = threading.Thread(target=spin, daemon=True)
     thread.start()
     try:
         rows = {row.name: row for row in look_at_topics(1.0)}
     finally:
-        executor.shutdown()
+        ended.set()
         thread.join()
+        executor.shutdown()
         node.destroy_node()
     detections = rows['/robot/detections']
     assert detections.rate_hz > 0
