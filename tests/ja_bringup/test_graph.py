@@ -79,6 +79,16 @@ def test_every_node_of_a_graph_is_there(graph):
         assert issubclass(spec.load(), Node)
 
 
+@pytest.mark.parametrize(('ahead', 'glance_images'), [(False, 1), (True, 2)])
+def test_a_fixation_is_longer_than_a_glance_of_the_fast_learner(ahead, glance_images):
+    graph = {n.thing: n.parameters for n in sim_graph(sim_parameters={'draw_ahead': ahead})}
+    image_s = 1 / graph['sim']['camera_rate_hz']
+    hold_s = graph['internal_evaluator']['hold_s']
+    # From the first image at rest to the last one of a glance, and to the next after that.
+    assert (glance_images - 1) * image_s < hold_s < glance_images * image_s
+    assert graph['gate']['fixation_wait_s'] == hold_s
+
+
 def test_only_the_sim_graph_has_a_truth_to_score():
     assert {'sim', 'scorer'} <= {spec.thing for spec in GRAPHS['sim']}
     for name in ('rig', 'bare rig'):

@@ -94,6 +94,14 @@ def demo(
             f"the paper's learner {SCENE['paper']}."
         ),
     ] = None,
+    draw_ahead: Annotated[
+        bool,
+        typer.Option(
+            '--draw-ahead',
+            help='Draw a picture while the last is judged: more images a second, each of a head '
+            'that answers one later.',
+        ),
+    ] = False,
     resume: Annotated[
         Path | None, typer.Option(help='Go on from what was learned in this run, in its folder.')
     ] = None,
@@ -108,7 +116,8 @@ def demo(
     from ja_bringup.demo import run_demo
 
     scene = scene or SCENE[learner.value]
-    graph = swapped(sim_graph(seed, {'scene': scene}, learner.value), swap or ())
+    sim = {'scene': scene, 'draw_ahead': draw_ahead}
+    graph = swapped(sim_graph(seed, sim, learner.value), swap or ())
     stages = standard_course(trials or PRACTICE_TRIALS[learner.value], time_s, exam_trials)
     graph = with_arguments([*[RECORDER] * record, *graph], context.obj or [])
     sys.exit(run_demo(graph, stages, one_process, on_death.value, context.obj or [], view, resume))

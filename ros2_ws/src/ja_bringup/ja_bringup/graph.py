@@ -143,11 +143,15 @@ def sim_graph(
     """The mind before the simulated head. The seed is everybody's, so that a run repeats.
 
     `learner`: whose preset (`config/demo_<learner>.yaml`) says how the learner and the gate are
-    set: the fast one, or the paper's.
+    set: the fast one, or the paper's. If the sim draws ahead, each glance of the fast one lasts
+    for two images, and only a third is a fixation.
     """
     sim = {'seed': seed, **(sim_parameters or {})}
     graph = [*_mind(seed), NodeSpec('ja_sim', 'scorer'), NodeSpec('ja_sim', 'sim', sim)]
-    for name in (f'demo_{learner}.yaml', 'demo.yaml'):
+    presets = [f'demo_{learner}.yaml', 'demo.yaml']
+    if sim.get('draw_ahead') and learner == 'gaze_line':
+        presets.insert(0, 'demo_gaze_line_ahead.yaml')
+    for name in presets:
         graph = _configured(CONFIG / name, graph)
     return graph
 
