@@ -1,6 +1,8 @@
 """`sim`: a camera and a head on topics, one step for each command that answers the last image."""
 
 import math
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -264,3 +266,12 @@ def test_world_that_cannot_be_made_is_one_clear_error(ros_context, parameters, t
     overrides = [Parameter(name, value=value) for name, value in parameters.items()]
     with pytest.raises(ConfigError, match=text):
         SimNode(context=ros_context, parameter_overrides=overrides)
+
+
+def test_a_program_that_ends_without_destroying_the_node_ends_quietly(domain):
+    program = 'import rclpy\nfrom ja_sim.sim_node import SimNode\nrclpy.init()\nnode = SimNode()\n'
+    done = subprocess.run(
+        [sys.executable, '-c', program], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0
+    assert 'Traceback' not in done.stderr

@@ -91,6 +91,9 @@ class Renderer:
 
 
 def _free(context: mujoco.MjrContext, gl: Any) -> None:
-    gl.make_current()
+    try:
+        gl.make_current()
+    except Exception:  # the bindings raise whatever the driver gives them
+        return  # the thread that drew has it still: it goes with the process
     context.free()
     gl.free()
