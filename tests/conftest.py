@@ -5,6 +5,7 @@ import random
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
+from pathlib import Path
 
 import pytest
 import rclpy
@@ -41,8 +42,10 @@ def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
 
 
 @pytest.fixture
-def ros_context(domain: int) -> Iterator[Context]:
-    """An initialised rclpy Context of this test alone, in the test's own domain."""
+def ros_context(domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Context]:
+    """An initialised rclpy Context of this test alone, in the test's own domain and folder."""
+    # What a rig has learned in runs/, here where the tests are run, is not for them.
+    monkeypatch.chdir(tmp_path)
     context = Context()
     rclpy.init(args=[], context=context, domain_id=domain)
     yield context

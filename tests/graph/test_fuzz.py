@@ -62,8 +62,7 @@ def odd(kind, value, rng):
 
 
 @pytest.mark.parametrize('thing', THINGS)
-def test_node_outlives_whatever_it_hears(thing, ros_context, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)  # a rig's own runs/ is not for tests
+def test_node_outlives_whatever_it_hears(thing, ros_context):
     spec, rng = THINGS[thing], random.Random(0)
     node = spec.load()(context=ros_context, cli_args=spec.ros_arguments())
     peer = SingleThreadedExecutor(context=ros_context)

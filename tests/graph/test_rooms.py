@@ -86,9 +86,8 @@ def test_the_robot_is_never_told(package):
     assert not wrong
 
 
-def test_only_the_scorer_hears_the_truth(ros_context, tmp_path, monkeypatch):
+def test_only_the_scorer_hears_the_truth(ros_context):
     """In the running graph, whatever the code says."""
-    monkeypatch.chdir(tmp_path)  # a rig's own runs/ is not for tests
     nodes = [
         spec.load()(context=ros_context, cli_args=spec.ros_arguments())
         for spec in [*sim_graph(), *rig_graph(str(Path(__file__).parent))]

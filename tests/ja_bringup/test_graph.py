@@ -97,10 +97,7 @@ def test_only_the_sim_graph_has_a_truth_to_score():
 
 
 @pytest.mark.parametrize('path', sorted(CONFIG.glob('*.yaml')), ids=lambda path: path.name)
-def test_every_configured_parameter_exists_in_the_node_it_is_for(
-    path, ros_context, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)  # a rig's own runs/ is not for tests
+def test_every_configured_parameter_exists_in_the_node_it_is_for(path, ros_context):
     graph = {spec.thing: spec for graph in GRAPHS.values() for spec in graph}
     sections = yaml.safe_load(path.read_text())
     for section, content in sections.items():
@@ -115,9 +112,8 @@ def test_every_configured_parameter_exists_in_the_node_it_is_for(
 
 
 @pytest.mark.parametrize('name', ['rig_ros2_control', 'rig_topics'])
-def test_configurations_of_rigs_fit_the_gate(name, ros_context, tmp_path, monkeypatch):
+def test_configurations_of_rigs_fit_the_gate(name, ros_context):
     """A name or value that the gate does not know would be an error here, not on the rig."""
-    monkeypatch.chdir(tmp_path)
     [gate] = [spec for spec in rig_graph() if spec.thing == 'gate']
     parameters = {**gate.parameters, **preset(CONFIG / f'{name}.yaml', 'gate')}
     spec = NodeSpec('ja_control', 'gate', parameters)

@@ -116,7 +116,7 @@ class SimNode(GraphNode):
         self._command: NDArray[np.float64] | None = None
         self._was_answered = False
         self._ahead = self._config.lockstep and self._config.draw_ahead
-        self._drawn = self._draw()
+        self._drawn: Future[_Round] | None = None
         self._round = self._next_round()
         self._published_s = -math.inf
         self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
@@ -153,17 +153,14 @@ class SimNode(GraphNode):
             self._tick()
 
     def _tick(self) -> None:
-        if not self._ahead:
-            self._drawn = self._draw()
         self._round = self._next_round()
         self._pace.made()
         self._publish()
 
     def _next_round(self) -> _Round:
-        """What is being drawn, once it is; drawing ahead, the one after it is begun."""
-        drawn = self._drawn.result()
-        if self._ahead:
-            self._drawn = self._draw()
+        """The next one, drawn now or ahead; if ahead, the one after it is begun."""
+        drawn = (self._drawn or self._draw()).result()
+        self._drawn = self._draw() if self._ahead else None
         return drawn
 
     def _draw(self) -> Future[_Round]:
@@ -232,9 +229,7 @@ class SimNode(GraphNode):
         step_ns = int(NS_PER_S / self._config.camera_rate_hz)
         self._time_offset_ns = to_ns(self._round.clock.clock) + step_ns
         # Neither a command to the world that was nor a picture of it belongs to the new one.
-        self._command = None
-        if self._ahead:
-            self._drawn = self._draw()
+        self._command = self._drawn = None
         self._tick()
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> Any:

@@ -23,7 +23,6 @@ import numpy as np
 import yaml
 from builtin_interfaces.msg import Time
 from numpy.typing import NDArray
-from scipy.stats import binomtest
 from std_msgs.msg import Header
 
 from ja_common.core.detection import Detection, Kind, caregiver_face, objects
@@ -31,6 +30,7 @@ from ja_common.core.geometry import angle_between, directions_of_rays
 from ja_common.core.posture import Posture
 from ja_common.detection_codec import encode_detections
 from ja_common.image_codec import decode_image, encode_image
+from ja_experiments.benchmarks._rows import mean_row, share_row
 from ja_experiments.package_pictures import package_file, package_folder, package_picture
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.camera_model import CameraModel
@@ -95,7 +95,7 @@ def named_objects() -> dict[str, Row]:
         ]
         rows[f'most salient is a named thing, {feature}'] = _share(hits)
     chance = [_covered(boxes) for _, boxes in marked]
-    rows['a random place is on a named thing'] = _mean(chance, '')
+    rows['a random place is on a named thing'] = mean_row(chance, '')
     return rows
 
 
@@ -119,7 +119,7 @@ def cv2_saliency() -> dict[str, Row]:
             place = (u / picture.shape[1], v / picture.shape[0])
             hits.append(any(_inside(place, box) for box in boxes))
         rows[f'most salient is a named thing, cv2 {method}'] = _share(hits)
-        rows[f'time of cv2 {method}'] = _mean([1000 * seconds for *_, seconds in places], 'ms')
+        rows[f'time of cv2 {method}'] = mean_row([1000 * seconds for *_, seconds in places], 'ms')
     return rows
 
 
@@ -162,7 +162,7 @@ def turning_head() -> dict[str, Row]:
             found, nothing_else = _mover_hits(photo, speed_deg_s)
             hits += found
             alone += nothing_else
-        rows[f'false motion at {speed_deg_s} deg/s'] = _mean(100 * np.array(shares), '% of px')
+        rows[f'false motion at {speed_deg_s} deg/s'] = mean_row(100 * np.array(shares), '% of px')
         rows[f'mover found at {speed_deg_s} deg/s'] = _share(hits)
         rows[f'nothing but the mover at {speed_deg_s} deg/s'] = _share(alone)
     return rows
@@ -199,7 +199,7 @@ def closed_loop() -> dict[str, Row]:
     ):
         for what, offsets_rad in attend(_frames(f'{package}/{name}')).items():
             if offsets_rad:
-                rows[f'{name}: {what} off the centre'] = _mean(np.degrees(offsets_rad), 'deg')
+                rows[f'{name}: {what} off the centre'] = mean_row(np.degrees(offsets_rad), 'deg')
     return rows
 
 
@@ -447,12 +447,4 @@ def _times(name: str, seconds: NDArray[np.float64]) -> dict[str, Row]:
 
 
 def _share(hits: list[bool]) -> Row:
-    low, high = binomtest(sum(hits), len(hits)).proportion_ci(method='wilson')
-    return {'value': float(np.mean(hits)), 'unit': '', 'n': len(hits), 'interval': [low, high]}
-
-
-def _mean(values: Any, unit: str) -> Row:
-    values = np.asarray(values, float)
-    half = 1.96 * float(values.std(ddof=1)) / np.sqrt(len(values))
-    mean = float(values.mean())
-    return {'value': mean, 'unit': unit, 'n': len(values), 'interval': [mean - half, mean + half]}
+    return share_row(hits, unit='')

@@ -16,7 +16,7 @@ import numpy as np
 
 from ja_experiments.benchmarks._ceiling import ceiling
 from ja_experiments.benchmarks._centerface import CenterFace
-from ja_experiments.benchmarks._rows import share_row
+from ja_experiments.benchmarks._rows import mean_row, share_row
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.box import Box
 from ja_perception.core.face_crop import crop_face
@@ -47,7 +47,7 @@ def speed(pictures: int = 200) -> dict[str, Row]:
     for preset in HEAD_PRESETS:
         world = JointAttentionWorld(_on_head(preset), seed=0)
         times = _times(partial(world.step, 0.1), pictures)
-        rows[f'step of 0.1 s, {preset}'] = _mean(1e3 * times, 'ms')
+        rows[f'step of 0.1 s, {preset}'] = mean_row(1e3 * times, 'ms')
         world.close()
     return rows
 
@@ -86,7 +86,7 @@ def head_pose(looks_per_person: int = 250) -> dict[str, Row]:
         'unseen people': _ridge_errors(crops, angles, people >= people.max() - 1),
     }
     return {
-        f'head {axis} from 30x25, {split}': _mean(error[:, i], 'deg')
+        f'head {axis} from 30x25, {split}': mean_row(error[:, i], 'deg')
         for split, error in errors.items()
         for i, axis in enumerate(('yaw', 'pitch'))
     }
@@ -242,12 +242,6 @@ def _times(call: Callable[[], object], count: int) -> np.ndarray:
 
 
 def _rate(times: np.ndarray, unit: str) -> Row:
-    row = _mean(times, unit)
+    row = mean_row(times, unit)
     low, high = row['interval']
     return row | {'value': 1.0 / row['value'], 'interval': [1.0 / high, 1.0 / low]}
-
-
-def _mean(values: np.ndarray, unit: str) -> Row:
-    mean, error = float(np.mean(values)), float(np.std(values, ddof=1) / np.sqrt(len(values)))
-    interval = [mean - 1.96 * error, mean + 1.96 * error]
-    return {'value': mean, 'unit': unit, 'n': len(values), 'interval': interval}
