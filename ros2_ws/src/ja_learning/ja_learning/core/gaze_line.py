@@ -87,7 +87,7 @@ class GazeLineLearner:
         # Proposals come from the running mean of the weights, which is steadier than the last.
         self._mean = copy.deepcopy(self._network).requires_grad_(False)
         self._optimiser = torch.optim.AdamW(
-            self._network.parameters(), lr=config.step_size, weight_decay=1e-3
+            self._network.parameters(), lr=config.step_size, weight_decay=1e-3, fused=True
         )
         self._annealing = _annealing(config.members)
         # How much was remembered when each member began to learn.
@@ -185,12 +185,19 @@ class GazeLineLearner:
         )
         self._optimiser.zero_grad()
         loss.backward()
+        self._hold_origins()
         self._optimiser.step()
         self._steps += 1
         keep = min(0.995, 1 - 1 / (self._steps / 10 + 1))
         with torch.no_grad():
-            for mean, now in zip(self._mean.parameters(), self._network.parameters(), strict=True):
-                mean.lerp_(now, 1 - keep)
+            now = list(self._network.parameters())
+            torch._foreach_lerp_(list(self._mean.parameters()), now, 1 - keep)
+
+    def _hold_origins(self) -> None:
+        """While all candidates count nearly alike, where a line begins would follow wrong guesses."""
+        held = self._coldness() < 1.0
+        if self._network.origin_tilt.grad is not None:
+            self._network.origin_tilt.grad[held] = 0.0
 
     def _varied(self, faces: torch.Tensor) -> torch.Tensor:
         """Each of faces (n, members, 30, 25) a little otherwise, as another look would show it.

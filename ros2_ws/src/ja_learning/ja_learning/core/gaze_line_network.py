@@ -56,8 +56,9 @@ class GazeLineNetwork(nn.Module):
     def gaze(self, faces: torch.Tensor) -> torch.Tensor:
         """u, shape (members, n, 2), of standardised faces (n, members or 1, 30, 25)."""
         faces = faces.expand(-1, self.members, -1, -1)
-        codes = self.coder(torch.cat([faces, faces.flip(-1)]))
-        codes = codes.reshape(len(codes), self.members, -1).transpose(0, 1)
+        # Grouped convolutions are faster with the channels last.
+        pictures = torch.cat([faces, faces.flip(-1)]).to(memory_format=torch.channels_last)
+        codes = self.coder(pictures).reshape(len(pictures), self.members, -1).transpose(0, 1)
         hidden = torch.relu(codes @ self.hidden_weights + self.hidden_biases)
         seen, mirrored = (hidden @ self.gaze_weights + self.gaze_biases).chunk(2, dim=1)
         pan, tilt = seen[..., 0] - mirrored[..., 0], seen[..., 1] + mirrored[..., 1]
@@ -84,9 +85,9 @@ class GazeLineNetwork(nn.Module):
 def standardised(faces: NDArray[np.uint8] | torch.Tensor) -> torch.Tensor:
     """Faces uint8 (..., 30, 25), each with mean 0 and deviation 1."""
     pixels = torch.as_tensor(faces).float() / 255
-    mean = pixels.mean(dim=(-2, -1), keepdim=True)
-    deviation = pixels.std(dim=(-2, -1), keepdim=True, correction=0)
-    return (pixels - mean) / deviation.clamp(min=1e-3)
+    pixels -= pixels.mean(dim=(-2, -1), keepdim=True)
+    deviation = pixels.square().mean(dim=(-2, -1), keepdim=True).sqrt()
+    return pixels / deviation.clamp(min=1e-3)
 
 
 def give_member(tensor: torch.Tensor, members: int, giver: int, taker: int) -> None:
