@@ -84,6 +84,16 @@ def test_lines_of_gaze_begin_at_a_tilt_of_their_own():
     assert torch.allclose(raised, before)
 
 
+def test_where_lines_begin_is_learned_by_members_that_have_cooled_alone(learner):
+    rng = np.random.default_rng(1)
+    # Members cool within 4, 11 and 32 trials with four objects.
+    for trial, cooled in ((3, 0), (8, 1), (20, 2), (40, 3)):
+        while learner.trials < trial:
+            learner.learn(lived_trial(rng)[0])
+        moved = learner.state()['network.origin_tilt'][:, 0] != 0.0
+        assert moved.tolist() == [member < cooled for member in range(3)]
+
+
 def test_it_learns_from_where_the_face_is_not_from_where_the_head_points(learner):
     other = GazeLineLearner(learner.config, seed=3)
     rng = np.random.default_rng(1)

@@ -194,10 +194,10 @@ class GazeLineLearner:
             torch._foreach_lerp_(list(self._mean.parameters()), now, 1 - keep)
 
     def _hold_origins(self) -> None:
-        """While all candidates count nearly alike, where a line begins would follow wrong guesses."""
-        held = self._coldness() < 1.0
-        if self._network.origin_tilt.grad is not None:
-            self._network.origin_tilt.grad[held] = 0.0
+        """Where a line begins would follow wrong guesses, while all candidates count alike."""
+        slope = self._network.origin_tilt.grad
+        if slope is not None:
+            slope[self._coldness() < 1.0] = 0.0
 
     def _varied(self, faces: torch.Tensor) -> torch.Tensor:
         """Each of faces (n, members, 30, 25) a little otherwise, as another look would show it.
