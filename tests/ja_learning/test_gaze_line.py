@@ -140,6 +140,32 @@ def test_depth_is_uncertain_along_the_line_of_gaze_and_not_across():
         assert network.log_density(gaze, along).min() > network.log_density(gaze, across).max() + 5
 
 
+def test_ratios_are_to_the_mean_of_all_places_that_were_seen():
+    network = GazeLineNetwork(members=2, channels=4)
+    gaze = torch.tensor([[[0.6, -0.3]], [[0.1, 0.5]]])
+    places, elsewhere = torch.randn(1, 1, 3, 2) / 2, torch.randn(2, 7, 2) / 2
+    places[0, 0, 2] = torch.nan
+    with torch.no_grad():
+        ratio = network.log_ratio(gaze, places, elsewhere).exp()
+        of_others = network.log_ratio(gaze, elsewhere[:, None], places[:, 0, :2].expand(2, -1, -1))
+        same = network.log_ratio(gaze, elsewhere[:, None, :1], elsewhere[:, :1].expand(2, 5, 2))
+    assert ratio.shape == (2, 1, 3)
+    assert ratio[..., 2].tolist() == [[0.0], [0.0]], 'what is not there'
+    mean = (ratio.sum(-1) + of_others.exp().sum(-1)) / 9
+    assert mean.flatten().tolist() == pytest.approx([1.0, 1.0], rel=1e-5)
+    assert same.flatten().tolist() == pytest.approx([0.0, 0.0], abs=1e-5), 'one place for all'
+
+
+def test_where_things_always_stand_teaches_nothing(learner):
+    rng = np.random.default_rng(5)
+    places = np.array([[0.4, 0.1], [-0.3, 0.2], [0.1, -0.2]])
+    for _ in range(40):
+        face = drawn_face(places[rng.integers(3)])
+        learner.learn(Trial(face, LOOK, LOOK[None], LOOK, LOOK + places, 3))
+    # Any of the three explains any face as well as another does: nothing tells them apart.
+    assert abs(learner.log_evidence) < 1.0
+
+
 def test_it_learns_which_object_was_meant_though_nobody_tells(learner):
     rng = np.random.default_rng(0)
     before = share_right(learner, rng)
@@ -233,7 +259,8 @@ def test_a_trial_in_which_nothing_was_seen_teaches_nothing(learner):
 
 def test_a_restored_learner_goes_on_bit_for_bit(learner):
     rng = np.random.default_rng(2)
-    for _ in range(6):
+    # After fifteen trials it weighs, too.
+    for _ in range(20):
         learner.learn(lived_trial(rng)[0])
     again = GazeLineLearner(GazeLineConfig(members=3, channels=4), seed=99)
     again.restore(learner.state())

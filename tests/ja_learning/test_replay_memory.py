@@ -37,6 +37,15 @@ def test_places_are_padded_as_wide_as_needed():
     assert np.isnan(places[0, 1, 1:]).all()
 
 
+def test_of_each_trial_one_of_the_places_seen_is_found():
+    memory = ReplayMemory(4)
+    for trial in range(5):
+        places = np.array([[trial, place] for place in range(1 + trial)])
+        memory.add(np.zeros(FACE_SHAPE, np.uint8), places)
+    ages, which = np.array([[0, 1], [2, 3]]), np.array([[0.99, 0.0], [0.4, 0.5]])
+    assert memory.places_at(ages, which).tolist() == [[[4, 4], [3, 0]], [[2, 1], [1, 1]]]
+
+
 def test_too_many_candidates_are_cut():
     memory = ReplayMemory(4)
     memory.add(np.zeros(FACE_SHAPE, np.uint8), np.zeros((MOST_CANDIDATES + 5, 2)))

@@ -3,7 +3,10 @@
 The paper learns from the one object that was fixated, right or wrong. This learner takes *all*
 objects seen in the trial as candidates; which one was meant is latent, and never told
 (cross-situational learning). It learns by gradient steps up the likelihood that *one* of the
-candidates was meant, or, with a small probability, none of them. Trials are kept and replayed.
+candidates was meant, or, with a small probability, none of them. How likely a candidate is, is
+asked in proportion to the places that were seen in other trials (noise-contrastive, as InfoNCE by
+van den Oord et al. 2018): nothing is to be learned from where things are seen, whatever she looks
+at. Trials are kept and replayed.
 
 Early in life the likelihood is tempered (deterministic annealing), or the first guesses would
 confirm themselves. How fast one may cool, nobody can know: so several members learn side by side,
@@ -39,8 +42,9 @@ from ja_learning.core.trial import Trial
 # there are, the later one may be told from another.
 _HASTIEST, _SLOWEST = 0.25, 2.0
 _COLDNESS_AT_FIRST = 0.1
-# If none was meant, the place is anywhere in a field of 80 x 30 degrees: 2 x 0.75 units.
-_FIELD = 1.5
+# With how many places, seen in other trials, those of a trial are compared: to learn, anew in every
+# step; to weigh it, once, where what is due to their choice would be taken for evidence.
+_ELSEWHERE_TO_LEARN, _ELSEWHERE_TO_WEIGH = 64, 256
 # How differently a face is replayed: its size (a share), its place, its pixels (in deviations).
 _VARIED_SIZE, _VARIED_PLACE_PIXELS, _VARIED_LIGHT = 0.1, 1.0, 0.3
 _COMPARED_EVERY_TRIALS = 10
@@ -163,9 +167,11 @@ class GazeLineLearner:
         def log_probability(faces: NDArray[np.uint8]) -> NDArray[np.float64]:
             with torch.no_grad():
                 gaze = self._mean.gaze(standardised(faces[:, None]))
-                density = self._mean.log_density(gaze, torch.from_numpy(places)[None, None])
+                seen = torch.from_numpy(places)[None, None]
+                elsewhere = self._elsewhere(_ELSEWHERE_TO_WEIGH)
+                ratio = self._mean.log_ratio(gaze, seen, elsewhere)
             # That one of them was meant; which, is not known.
-            of_members = torch.logsumexp(density, dim=-1).numpy().astype(float)
+            of_members = torch.logsumexp(ratio, dim=-1).numpy().astype(float)
             mixed = np.logaddexp.reduce(of_members + self._log_weights()[:, None], axis=0)
             return np.concatenate([of_members, mixed[None]])
 
@@ -219,16 +225,25 @@ class GazeLineLearner:
             faces.shape, generator=self._random
         )
 
+    def _elsewhere(self, count: int) -> torch.Tensor:
+        """Places (members, count, 2) that were seen in any of the trials remembered."""
+        drawn = (count, self.config.members)
+        ages = torch.randint(len(self._memory), drawn, generator=self._random)
+        which = torch.rand(drawn, generator=self._random)
+        places = self._memory.places_at(ages.numpy(), which.numpy())
+        return torch.from_numpy(places).transpose(0, 1)
+
     def _loss(self, faces: torch.Tensor, places: torch.Tensor) -> torch.Tensor:
         """Minus the tempered log likelihood that one of the candidates, or none, was meant."""
-        there = ~torch.isnan(places[..., 0])
-        counts = there.sum(-1, keepdim=True)
+        counts = (~torch.isnan(places[..., 0])).sum(-1, keepdim=True)
         coldness = self._coldness()[:, None, None]
-        density = self._network.log_density(self._network.gaze(faces), torch.nan_to_num(places))
+        elsewhere = self._elsewhere(_ELSEWHERE_TO_LEARN)
+        ratio = self._network.log_ratio(self._network.gaze(faces), places, elsewhere)
         none = self.config.none_was_meant
-        one = coldness * density + np.log1p(-none) - torch.log(counts)
-        elsewhere = (coldness * np.log(none / _FIELD)).expand(-1, len(faces), -1)
-        tempered = torch.cat([one.masked_fill(~there, -torch.inf), elsewhere], dim=-1)
+        one = coldness * ratio + np.log1p(-none) - torch.log(counts)
+        # If none was meant, places are what they are elsewhere: a ratio of 1.
+        nothing = (coldness * np.log(none)).expand(-1, len(faces), -1)
+        tempered = torch.cat([one, nothing], dim=-1)
         # A sum over members, as none of them depends on another.
         return -(torch.logsumexp(tempered, dim=-1) / coldness[..., 0]).mean(dim=1).sum()
 

@@ -60,18 +60,23 @@ class GazeLineBelief:
         net = self._network
         with torch.no_grad():
             shares = torch.softmax(net.stretch_logits, dim=-1).numpy().astype(float)
-            deviations = [
+            of_stretch, of_gaze, of_place = (
                 torch.exp(logs).numpy().astype(float)
-                for logs in (net.log_gaze_deviation, net.log_place_deviation)
-            ]
-            line = net.on_line(self._gaze(face))[:, 0].numpy().astype(float)
+                for logs in (
+                    net.log_stretch_deviation,
+                    net.log_gaze_deviation,
+                    net.log_place_deviation,
+                )
+            )
+            gaze = self._gaze(face)
+            line = net.on_line(gaze)[:, 0].numpy().astype(float)
         member = rng.choice(len(shares), count, p=_normalised(np.exp(self._log_weights)))
         at = (rng.random((count, 1)) > np.cumsum(shares, axis=1)[member]).sum(axis=1)
         at = np.minimum(at, len(STRETCHES) - 1)
-        stretch = STRETCHES.numpy()[at, None]
-        off = stretch * deviations[0][member] * rng.standard_normal((count, 2))
-        near = deviations[1][member] * rng.standard_normal((count, 2))
-        places = line[member, at] + off + near
+        along = of_stretch[member] * rng.standard_normal((count, 1)) * gaze[member, 0].numpy()
+        around = of_gaze[member] * rng.standard_normal((count, 2))
+        near = of_place[member] * rng.standard_normal((count, 2))
+        places = line[member, at] + STRETCHES.numpy()[at, None] * (along + around) + near
         return np.asarray(face_at, float) + places * ANGLE_SCALE_RAD
 
     def log_density(

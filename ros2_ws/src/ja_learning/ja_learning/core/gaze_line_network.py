@@ -3,11 +3,13 @@
 A face gives a gaze u, and what she means stands somewhere along it, since depth cannot be told
 from the direction of a gaze. The displacement c from her face is a mixture over stretches r_k:
 
-    p(c | face) = sum_k w_k N(c; o + r_k u(face), r_k^2 S_u + S_c)
+    p(c | face) = sum_k w_k N(c; o + r_k u, r_k^2 (s_r^2 u u^T + s_u^2 I) + s_c^2 I),  u = u(face)
 
-u is a convolutional network, odd in pan and even in tilt under a mirror (a face is symmetric, and
-so is the task). o is where the lines begin: at her eyes, which are above the middle of what the
-detector takes for a face, so that o has a tilt alone. Angles are in units of `ANGLE_SCALE_RAD`.
+A stretch is known to s_r (a share of it), which lets it reach into the next; the gaze to s_u, a
+place to s_c. u is a convolutional network, odd in pan and even in tilt under a mirror (a face is
+symmetric, and so is the task). o is where the lines begin: at her eyes, which are above the middle
+of what the detector takes for a face, so that o has a tilt alone. Angles are in units of
+`ANGLE_SCALE_RAD`.
 """
 
 import math
@@ -50,8 +52,9 @@ class GazeLineNetwork(nn.Module):
         self.gaze_biases = nn.Parameter(_uniform(_HIDDEN, (members, 1, 2)))
         self.origin_tilt = nn.Parameter(torch.zeros(members, 1))
         self.stretch_logits = nn.Parameter(torch.zeros(members, len(STRETCHES)))
-        self.log_gaze_deviation = nn.Parameter(torch.tensor([[0.10, 0.06]] * members).log())
-        self.log_place_deviation = nn.Parameter(torch.tensor([[0.05, 0.05]] * members).log())
+        self.log_gaze_deviation = nn.Parameter(torch.full((members, 1), 0.08).log())
+        self.log_stretch_deviation = nn.Parameter(torch.full((members, 1), 0.12).log())
+        self.log_place_deviation = nn.Parameter(torch.full((members, 1), 0.05).log())
 
     def gaze(self, faces: torch.Tensor) -> torch.Tensor:
         """u, shape (members, n, 2), of standardised faces (n, members or 1, 30, 25)."""
@@ -71,15 +74,34 @@ class GazeLineNetwork(nn.Module):
 
     def log_density(self, gaze: torch.Tensor, places: torch.Tensor) -> torch.Tensor:
         """log p(c | face), (members, n, m), of places (members or 1, n, m, 2), given their u."""
-        stretch = STRETCHES[:, None]
-        variance = stretch**2 * torch.exp(2 * self.log_gaze_deviation)[:, None] + torch.exp(
-            2 * self.log_place_deviation[:, None]
-        )
+        squared = STRETCHES**2
+        across = squared * self.log_gaze_deviation.mul(2).exp()
+        across = (across + self.log_place_deviation.mul(2).exp())[:, None, None]
+        further = (squared * self.log_stretch_deviation.mul(2).exp())[:, None, None]
+        along = across + further * gaze.square().sum(-1)[..., None, None]
         off = places[..., None, :] - self.on_line(gaze)[:, :, None]
-        scale = torch.log(2 * np.pi * variance).sum(-1)[:, None, None]
-        parts = -0.5 * ((off**2 / variance[:, None, None]).sum(-1) + scale)
+        on_gaze = (off * gaze[:, :, None, None]).sum(-1)
+        # Of the covariance `across` I + `further` u u^T the inverse, by Sherman and Morrison.
+        squares = (off.square().sum(-1) - further / along * on_gaze.square()) / across
+        parts = -0.5 * (squares + torch.log(across * along)) - math.log(2 * math.pi)
         shares = torch.log_softmax(self.stretch_logits, dim=-1)[:, None, None]
         return torch.logsumexp(parts + shares, dim=-1)
+
+    def log_ratio(
+        self, gaze: torch.Tensor, places: torch.Tensor, elsewhere: torch.Tensor
+    ) -> torch.Tensor:
+        """log p(c | face), (members, n, m), less log of its mean; -inf where c is NaN.
+
+        `places`: (members or 1, n or 1, m, 2), seen in a trial; `elsewhere`: (members, k, 2), seen
+        in others. The mean is over both, so that no ratio is beyond their number.
+        """
+        others = elsewhere[:, None].expand(-1, places.shape[1], -1, -1)
+        every = torch.cat([places.expand(len(others), -1, -1, -1), others], dim=2)
+        missing = torch.isnan(every[..., 0])
+        density = self.log_density(gaze, torch.nan_to_num(every))
+        density = density.masked_fill(missing, -torch.inf)
+        mean = torch.logsumexp(density, dim=-1) - torch.log((~missing).sum(-1))
+        return density[..., : places.shape[2]] - mean[..., None]
 
 
 def standardised(faces: NDArray[np.uint8] | torch.Tensor) -> torch.Tensor:

@@ -37,10 +37,18 @@ class ReplayMemory:
 
     def at(self, ages: NDArray[np.int64]) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """Faces (..., 30, 25) and places (..., m, 2) of these ages, the newest 0; m as needed."""
-        index = (self._newest - ages) % max(len(self._faces), 1)
+        index = self._index(ages)
         places = self._places[index]
         widest = int((~np.isnan(places[..., 0])).sum(axis=-1).max(initial=0))
         return self._faces[index], places[..., :widest, :]
+
+    def places_at(
+        self, ages: NDArray[np.int64], which: NDArray[np.floating]
+    ) -> NDArray[np.float32]:
+        """One place (..., 2) of each of these ages: `which`, 0-1, of those that were seen."""
+        trials = self._index(ages)
+        counts = (~np.isnan(self._places[trials, :, 0])).sum(axis=-1)
+        return self._places[trials, (which * counts).astype(int)]
 
     def counts(self, newest: int) -> NDArray[np.int64]:
         """How many objects were seen in each of so many newest trials."""
@@ -75,6 +83,9 @@ class ReplayMemory:
         for face, seen in zip(faces, np.split(places, np.cumsum(counts))[:-1], strict=True):
             memory.add(face, seen)
         return memory
+
+    def _index(self, ages: NDArray[np.int64]) -> NDArray[np.int64]:
+        return (self._newest - ages) % max(len(self._faces), 1)
 
     def _grow(self) -> None:
         more = min(max(64, self._count), self._capacity - self._count)
