@@ -42,7 +42,7 @@ from ja_learning.core.trial import Trial
 # there are, the later one may be told from another.
 _HASTIEST, _SLOWEST = 0.25, 2.0
 _COLDNESS_AT_FIRST = 0.1
-# With how many places, seen in other trials, those of a trial are compared: to learn, anew in every
+# With how many places, seen in other trials, those of a trial are compared: to learn, anew in each
 # step; to weigh it, once, where what is due to their choice would be taken for evidence.
 _ELSEWHERE_TO_LEARN, _ELSEWHERE_TO_WEIGH = 64, 256
 # How differently a face is replayed: its size (a share), its place, its pixels (in deviations).
