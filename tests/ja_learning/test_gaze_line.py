@@ -159,7 +159,7 @@ def test_ratios_are_to_the_mean_of_all_places_that_were_seen():
 def test_what_is_seen_in_every_trial_is_not_taken_for_what_she_means(learner):
     """Told by likelihood alone it was, in one trial of seven: it explains all faces."""
     rng = np.random.default_rng(0)
-    lamp = LOOK + [0.3, -0.2]
+    lamp = LOOK + np.array([0.3, -0.2])
 
     def beside_a_lamp() -> Trial:
         trial, _ = lived_trial(rng)

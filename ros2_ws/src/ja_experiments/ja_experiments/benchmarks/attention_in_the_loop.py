@@ -21,7 +21,7 @@ from ja_experiments.processes import side_by_side
 from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
 from ja_sim.core.scene import load_scene
 
-SEEDS = range(3)
+SEEDS = range(5)
 TRIALS, LAST = 400, 100
 OBJECTS = (1, 3, 5, 10)
 BEFORE_CHANGE = 200
