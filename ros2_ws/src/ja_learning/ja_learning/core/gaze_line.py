@@ -143,8 +143,9 @@ class GazeLineLearner:
         self._memory.add(trial.face, places)
         if changed:
             self._begin_anew(self._alarm.doubtful_trials)
+        coldness = self._coldness()
         for _ in range(self.config.replay_steps):
-            self._step()
+            self._step(coldness)
         if self.trials % _COMPARED_EVERY_TRIALS == 0:
             self._replace_the_beaten()
 
@@ -179,7 +180,7 @@ class GazeLineLearner:
         log_ratio = float(self._evidence.weigh(face, log_probability)[-1])
         return self._alarm.raised_by(log_ratio, knew)
 
-    def _step(self) -> None:
+    def _step(self, coldness: torch.Tensor) -> None:
         members, known = self.config.members, len(self._memory)
         count = min(self.config.replay_batch, known)
         # Each member replays its own choice, so that they differ; the newest trial always.
@@ -187,11 +188,11 @@ class GazeLineLearner:
         ages[0] = 0
         faces, places = self._memory.at(ages)
         loss = self._loss(
-            self._varied(standardised(faces)), torch.from_numpy(places).transpose(0, 1)
+            self._varied(standardised(faces)), torch.from_numpy(places).transpose(0, 1), coldness
         )
         self._optimiser.zero_grad()
         loss.backward()
-        self._hold_origins()
+        self._hold_origins(coldness)
         self._optimiser.step()
         self._steps += 1
         keep = min(0.995, 1 - 1 / (self._steps / 10 + 1))
@@ -199,11 +200,11 @@ class GazeLineLearner:
             now = list(self._network.parameters())
             torch._foreach_lerp_(list(self._mean.parameters()), now, 1 - keep)
 
-    def _hold_origins(self) -> None:
+    def _hold_origins(self, coldness: torch.Tensor) -> None:
         """Where a line begins would follow wrong guesses, while all candidates count alike."""
         slope = self._network.origin_tilt.grad
         if slope is not None:
-            slope[self._coldness() < 1.0] = 0.0
+            slope[coldness < 1.0] = 0.0
 
     def _varied(self, faces: torch.Tensor) -> torch.Tensor:
         """Each of faces (n, members, 30, 25) a little otherwise, as another look would show it.
@@ -233,10 +234,12 @@ class GazeLineLearner:
         places = self._memory.places_at(ages.numpy(), which.numpy())
         return torch.from_numpy(places).transpose(0, 1)
 
-    def _loss(self, faces: torch.Tensor, places: torch.Tensor) -> torch.Tensor:
+    def _loss(
+        self, faces: torch.Tensor, places: torch.Tensor, coldness: torch.Tensor
+    ) -> torch.Tensor:
         """Minus the tempered log likelihood that one of the candidates, or none, was meant."""
         counts = (~torch.isnan(places[..., 0])).sum(-1, keepdim=True)
-        coldness = self._coldness()[:, None, None]
+        coldness = coldness[:, None, None]
         elsewhere = self._elsewhere(_ELSEWHERE_TO_LEARN)
         ratio = self._network.log_ratio(self._network.gaze(faces), places, elsewhere)
         none = self.config.none_was_meant

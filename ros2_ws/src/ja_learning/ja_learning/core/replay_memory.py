@@ -38,22 +38,19 @@ class ReplayMemory:
     def at(self, ages: NDArray[np.int64]) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         """Faces (..., 30, 25) and places (..., m, 2) of these ages, the newest 0; m as needed."""
         index = self._index(ages)
-        places = self._places[index]
-        widest = int((~np.isnan(places[..., 0])).sum(axis=-1).max(initial=0))
-        return self._faces[index], places[..., :widest, :]
+        widest = int(self._seen(index).max(initial=0))
+        return self._faces[index], self._places[index, :widest]
 
     def places_at(
         self, ages: NDArray[np.int64], which: NDArray[np.floating]
     ) -> NDArray[np.float32]:
         """One place (..., 2) of each of these ages: `which`, 0-1, of those that were seen."""
-        trials = self._index(ages)
-        counts = (~np.isnan(self._places[trials, :, 0])).sum(axis=-1)
-        return self._places[trials, (which * counts).astype(int)]
+        index = self._index(ages)
+        return self._places[index, (which * self._seen(index)).astype(int)]
 
     def counts(self, newest: int) -> NDArray[np.int64]:
         """How many objects were seen in each of so many newest trials."""
-        places = self.at(np.arange(min(newest, self._count)))[1]
-        return (~np.isnan(places[..., 0])).sum(axis=-1)
+        return self._seen(self._index(np.arange(min(newest, self._count))))
 
     def keep_newest(self, count: int) -> None:
         """Forget all but so many."""
@@ -86,6 +83,9 @@ class ReplayMemory:
 
     def _index(self, ages: NDArray[np.int64]) -> NDArray[np.int64]:
         return (self._newest - ages) % max(len(self._faces), 1)
+
+    def _seen(self, index: NDArray[np.int64]) -> NDArray[np.int64]:
+        return (~np.isnan(self._places[index, :, 0])).sum(axis=-1)
 
     def _grow(self) -> None:
         more = min(max(64, self._count), self._capacity - self._count)
