@@ -72,20 +72,33 @@ class GazeLineNetwork(nn.Module):
         origin = nn.functional.pad(self.origin_tilt, (1, 0))
         return origin[:, None, None] + STRETCHES[:, None] * gaze[:, :, None]
 
-    def log_density(self, gaze: torch.Tensor, places: torch.Tensor) -> torch.Tensor:
-        """log p(c | face), (members, n, m), of places (members or 1, n, m, 2), given their u."""
+    def forms(self, gaze: torch.Tensor) -> torch.Tensor:
+        """The parts of p(c | face) for gazes u (members, n, 2): (members, n, 6, stretches).
+
+        Each is a quadratic form: `quadratic(c) @ forms` is log of w_k N(c; ...). The largest work
+        of a lesson, with every place for every gaze, is then one product of matrices.
+        """
         squared = STRETCHES**2
         across = squared * self.log_gaze_deviation.mul(2).exp()
-        across = (across + self.log_place_deviation.mul(2).exp())[:, None, None]
-        further = (squared * self.log_stretch_deviation.mul(2).exp())[:, None, None]
-        along = across + further * gaze.square().sum(-1)[..., None, None]
-        off = places[..., None, :] - self.on_line(gaze)[:, :, None]
-        on_gaze = (off * gaze[:, :, None, None]).sum(-1)
+        across = (across + self.log_place_deviation.mul(2).exp())[:, None]
+        further = (squared * self.log_stretch_deviation.mul(2).exp())[:, None]
+        along = across + further * gaze.square().sum(-1, keepdim=True)
         # Of the covariance `across` I + `further` u u^T the inverse, by Sherman and Morrison.
-        squares = (off.square().sum(-1) - further / along * on_gaze.square()) / across
-        parts = -0.5 * (squares + torch.log(across * along)) - math.log(2 * math.pi)
-        shares = torch.log_softmax(self.stretch_logits, dim=-1)[:, None, None]
-        return torch.logsumexp(parts + shares, dim=-1)
+        pan, tilt = gaze.split(1, dim=-1)
+        less = further / along
+        pans = (1 - less * pan**2) / across
+        tilts = (1 - less * tilt**2) / across
+        both = -less * pan * tilt / across
+        at_pan, at_tilt = self.on_line(gaze).unbind(-1)
+        to_pan, to_tilt = pans * at_pan + both * at_tilt, both * at_pan + tilts * at_tilt
+        shares = torch.log_softmax(self.stretch_logits, dim=-1)[:, None]
+        peak = shares - 0.5 * torch.log(across * along) - math.log(2 * math.pi)
+        at_zero = peak - 0.5 * (at_pan * to_pan + at_tilt * to_tilt)
+        return torch.stack([at_zero, to_pan, to_tilt, -0.5 * pans, -both, -0.5 * tilts], dim=2)
+
+    def log_density(self, gaze: torch.Tensor, places: torch.Tensor) -> torch.Tensor:
+        """log p(c | face), (members, n, m), of places (members or 1, n or 1, m, 2), given u."""
+        return torch.logsumexp(quadratic(places) @ self.forms(gaze), dim=-1)
 
     def log_ratio(
         self, gaze: torch.Tensor, places: torch.Tensor, elsewhere: torch.Tensor
@@ -95,13 +108,21 @@ class GazeLineNetwork(nn.Module):
         `places`: (members or 1, n or 1, m, 2), seen in a trial; `elsewhere`: (members, k, 2), seen
         in others. The mean is over both, so that no ratio is beyond their number.
         """
-        others = elsewhere[:, None].expand(-1, places.shape[1], -1, -1)
-        every = torch.cat([places.expand(len(others), -1, -1, -1), others], dim=2)
-        missing = torch.isnan(every[..., 0])
-        density = self.log_density(gaze, torch.nan_to_num(every))
-        density = density.masked_fill(missing, -torch.inf)
-        mean = torch.logsumexp(density, dim=-1) - torch.log((~missing).sum(-1))
-        return density[..., : places.shape[2]] - mean[..., None]
+        forms, missing = self.forms(gaze), torch.isnan(places[..., 0])
+        here = torch.logsumexp(quadratic(torch.nan_to_num(places)) @ forms, dim=-1)
+        here = here.masked_fill(missing, -torch.inf)
+        # One product for each member, not for each of its gazes.
+        there = quadratic(elsewhere) @ forms.transpose(1, 2).flatten(2)
+        there = torch.logsumexp(there.unflatten(2, (-1, len(STRETCHES))), dim=(1, 3))
+        total = torch.logaddexp(torch.logsumexp(here, dim=-1), there)
+        count = (~missing).sum(-1) + elsewhere.shape[1]
+        return here - (total - torch.log(count))[..., None]
+
+
+def quadratic(places: torch.Tensor) -> torch.Tensor:
+    """What a quadratic form of places (..., 2) is made of, (..., 6), in the order of `forms`."""
+    pan, tilt = places.unbind(-1)
+    return torch.stack([torch.ones_like(pan), pan, tilt, pan**2, pan * tilt, tilt**2], dim=-1)
 
 
 def standardised(faces: NDArray[np.uint8] | torch.Tensor) -> torch.Tensor:

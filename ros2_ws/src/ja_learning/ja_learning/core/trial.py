@@ -4,6 +4,7 @@ Nobody announces a trial. It begins with a look at the caregiver and ends with t
 after it, or is given up: the head looks at her again. What was seen was seen in any case.
 """
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -73,7 +74,7 @@ class TrialRecorder:
         self._face: NDArray[np.uint8] | None = None
         self._face_at = np.zeros(2)
         self._postures: list[NDArray[np.float64]] = []
-        self._candidates: list[NDArray[np.float64]] = []
+        self._candidates: list[list[float]] = []
         self._seen_before_shift = 0
         self._looking_around = False
 
@@ -121,12 +122,14 @@ class TrialRecorder:
         """Objects stand in these directions (m, 2) [rad], seen while the head stands still."""
         if self._face is None:
             return
-        for direction in np.asarray(directions, float).reshape(-1, 2):
-            distances = [np.hypot(*(direction - known)) for known in self._candidates]
-            if not distances or min(distances) > SAME_OBJECT_RAD:
+        for direction in np.asarray(directions, float).reshape(-1, 2).tolist():
+            # Many and small: numpy would take longer than all else that a proposal takes.
+            distances = [math.dist(direction, known) for known in self._candidates]
+            nearest = min(distances, default=math.inf)
+            if nearest > SAME_OBJECT_RAD:
                 self._candidates.append(direction)
             else:  # the newest sight counts: nearer to the centre, and things move
-                self._candidates[int(np.argmin(distances))] = direction
+                self._candidates[distances.index(nearest)] = direction
         if self._looking_around:
             self._seen_before_shift = len(self._candidates)
 
