@@ -7,7 +7,13 @@ import pytest
 import torch
 
 from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
-from ja_learning.core.gaze_line_network import GazeLineNetwork, give_member
+from ja_learning.core.gaze_line_belief import GazeLineBelief
+from ja_learning.core.gaze_line_network import (
+    ANGLE_SCALE_RAD,
+    GazeLineNetwork,
+    give_member,
+    standardised,
+)
 from ja_learning.core.learner import LearnerChoice, make_learner
 from ja_learning.core.network import NetworkConfig
 from ja_learning.core.trial import Trial
@@ -80,7 +86,8 @@ def test_lines_of_gaze_begin_at_a_tilt_of_their_own():
         before = network.log_density(gaze, straight)
         network.origin_tilt.fill_(-0.2)
         raised = network.log_density(gaze, straight - torch.tensor([0.0, 0.2]))
-        assert network.on_line(gaze)[0, 0, :, 1].tolist() == pytest.approx([-0.2] * 9)
+        _, tilt = network.mixture().on_line(*gaze.split(1, dim=-1))
+        assert tilt.flatten().tolist() == pytest.approx([-0.2] * 9)
     assert torch.allclose(raised, before)
 
 
@@ -138,6 +145,42 @@ def test_depth_is_uncertain_along_the_line_of_gaze_and_not_across():
     across = gaze[:, :, None] + torch.tensor([-0.25, 0.6])
     with torch.no_grad():
         assert network.log_density(gaze, along).min() > network.log_density(gaze, across).max() + 5
+
+
+def test_who_asks_reckons_as_who_learns():
+    network = GazeLineNetwork(members=2, channels=4)
+    rng = np.random.default_rng(0)
+    faces = rng.integers(0, 256, (3, 30, 25)).astype(np.uint8)
+    places = rng.uniform(-0.5, 0.5, (7, 2))
+    with torch.no_grad():
+        network.stretch_logits.normal_()
+        network.origin_tilt.fill_(-0.1)
+        gaze = network.gaze(standardised(faces[:, None]))
+        scaled = torch.from_numpy(places / ANGLE_SCALE_RAD).float()[None, None]
+        learned = network.log_density(gaze, scaled).numpy() - 2 * np.log(ANGLE_SCALE_RAD)
+    for member in range(2):
+        weights = np.where(np.arange(2) == member, 0.0, -np.inf)
+        belief = GazeLineBelief(network, weights, 0.0, True, 4.5)
+        asked = belief.log_density(faces, LOOK, LOOK + places)
+        assert asked == pytest.approx(learned[member], abs=1e-3)
+
+
+def test_weights_that_code_a_face_decay_and_the_numbers_of_the_belief_do_not():
+    def taught(weight_decay: float) -> dict[str, np.ndarray]:
+        config = GazeLineConfig(members=2, channels=4, weight_decay=weight_decay)
+        learner, rng = GazeLineLearner(config, seed=3), np.random.default_rng(1)
+        for _ in range(5):
+            learner.learn(lived_trial(rng)[0])
+        return learner.state()
+
+    freely, decaying = taught(0.0), taught(20.0)
+    # 20 steps, each of which takes 6 % of every weight.
+    for name in ('coder.0.weight', 'coder.4.weight', 'hidden_weights', 'gaze_weights'):
+        name = f'network.{name}'
+        assert np.linalg.norm(decaying[name]) < 0.5 * np.linalg.norm(freely[name])
+    for name in ('gaze', 'stretch', 'place'):
+        name = f'network.log_{name}_deviation'
+        assert decaying[name] == pytest.approx(freely[name], abs=0.2)
 
 
 def test_ratios_are_to_the_mean_of_all_places_that_were_seen():

@@ -23,7 +23,7 @@ from ja_experiments.benchmarks._rows import success_row
 from ja_experiments.looks import POOL, Looks, load_looks
 from ja_experiments.processes import side_by_side
 from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
-from ja_learning.core.learner import Learner, LearnerChoice, make_learner
+from ja_learning.core.learner import LearnerChoice, Predictor, make_learner
 from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
 from ja_learning.core.trial import Trial
 
@@ -108,7 +108,7 @@ def curve(kind: str, condition: Condition, seed: int) -> list[float]:
         learner.learn(_trial(rng, world, trial, condition))
         if trial in condition.marks:
             tested = world[: condition.pool] if condition.pool else world[-TEST_LOOKS:]
-            found.append(success(learner, tested, condition.objects, seed))
+            found.append(success(learner.snapshot(), tested, condition.objects, seed))
     return found
 
 
@@ -121,7 +121,7 @@ def _looks_elsewhere(condition: Condition, seed: int) -> Looks | None:
     return load_looks('default', (seed + 1) % len(SEEDS), LOOKS)
 
 
-def success(learner: Learner, looks: Looks, objects: int, seed: int) -> float:
+def success(learner: Predictor, looks: Looks, objects: int, seed: int) -> float:
     """How often the learner alone chooses the object that was meant, 0-1."""
     rng = np.random.default_rng([seed, objects, 1])
     right = []

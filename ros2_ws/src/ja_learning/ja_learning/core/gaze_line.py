@@ -62,6 +62,9 @@ class GazeLineConfig:
     replay_batch: int = parameter(32, 'trials a gradient step', low=1, high=4096)
     replay_memory: int = parameter(5000, 'trials kept for replay', low=1, high=100000)
     step_size: float = parameter(0.003, 'step size of AdamW', low=1e-6, high=1.0)
+    weight_decay: float = parameter(
+        0.5, 'decay of the weights that code a face, as in AdamW', low=0.0, high=100.0
+    )
     channels: int = parameter(8, 'channels of the first convolution', low=1, high=256)
     none_was_meant: float = parameter(
         0.05, 'prior probability that none of the candidates was meant', low=1e-4, high=0.9
@@ -90,9 +93,7 @@ class GazeLineLearner:
         self._random = torch.Generator().manual_seed(seed)
         # Proposals come from the running mean of the weights, which is steadier than the last.
         self._mean = copy.deepcopy(self._network).requires_grad_(False)
-        self._optimiser = torch.optim.AdamW(
-            self._network.parameters(), lr=config.step_size, weight_decay=1e-3, fused=True
-        )
+        self._optimiser = _optimiser(self._network, config)
         self._annealing = _annealing(config.members)
         # How much was remembered when each member began to learn.
         self._began = np.zeros(config.members, int)
@@ -367,6 +368,18 @@ def _untaught(config: GazeLineConfig, seed: int) -> GazeLineNetwork:
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         return GazeLineNetwork(config.members, config.channels)
+
+
+def _optimiser(network: GazeLineNetwork, config: GazeLineConfig) -> torch.optim.AdamW:
+    # What a trial says of a gaze is far less exact than its picture is, so that whoever may fit
+    # anything learns the noise. The numbers of the belief mean something: zero is not their home.
+    decaying = network.weights()
+    others = [p for p in network.parameters() if not any(p is weight for weight in decaying)]
+    groups = [
+        {'params': decaying, 'weight_decay': config.weight_decay},
+        {'params': others, 'weight_decay': 0.0},
+    ]
+    return torch.optim.AdamW(groups, lr=config.step_size, fused=True)
 
 
 def _annealing(members: int) -> NDArray[np.float64]:

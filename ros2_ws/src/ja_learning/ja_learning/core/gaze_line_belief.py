@@ -6,13 +6,8 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 
-from ja_learning.core.gaze_line_network import (
-    ANGLE_SCALE_RAD,
-    STRETCHES,
-    GazeLineNetwork,
-    quadratic,
-    standardised,
-)
+from ja_learning.core.gaze_line_mixture import LineMixture, powers
+from ja_learning.core.gaze_line_network import ANGLE_SCALE_RAD, GazeLineNetwork, standardised
 
 
 class GazeLineBelief:
@@ -32,6 +27,7 @@ class GazeLineBelief:
         plausible_within_nats: float,
     ) -> None:
         self._network, self._log_weights = network, log_weights
+        self._mixture = _numpy(network.mixture())
         self._top_down, self._plausible_within = top_down, plausible_within_nats
         self.log_evidence = log_evidence
         self._coded: _Coded | None = None
@@ -44,7 +40,7 @@ class GazeLineBelief:
         coded = self._code(face)
         aim = coded.best_guess
         if self._top_down and len(places := np.asarray(candidates, float).reshape(-1, 2) - origin):
-            density = self._mixed(coded.forms, places)[0]
+            density = self._mixed(coded.forms, places / ANGLE_SCALE_RAD)[0]
             best = int(np.argmax(density))
             if density[best] > coded.log_density_there - self._plausible_within:
                 aim = places[best]
@@ -54,26 +50,22 @@ class GazeLineBelief:
         self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
     ) -> NDArray[np.float64]:
         """Directions (count, 2) [rad] drawn from the belief about what she means."""
-        net = self._network
-        with torch.no_grad():
-            shares = torch.softmax(net.stretch_logits, dim=-1).numpy().astype(float)
-            of_stretch, of_gaze, of_place = (
-                torch.exp(logs).numpy().astype(float)
-                for logs in (
-                    net.log_stretch_deviation,
-                    net.log_gaze_deviation,
-                    net.log_place_deviation,
-                )
-            )
-            gaze = self._code(face).gaze
-            line = net.on_line(gaze)[:, 0].numpy().astype(float)
-        member = rng.choice(len(shares), count, p=_normalised(np.exp(self._log_weights)))
+        coded, mixture = self._code(face), self._mixture
+        shares = np.exp(mixture.log_shares[:, 0])
+        weights = np.exp(self._log_weights)
+        member = rng.choice(len(weights), count, p=weights / weights.sum())
         at = (rng.random((count, 1)) > np.cumsum(shares, axis=1)[member]).sum(axis=1)
-        at = np.minimum(at, len(STRETCHES) - 1)
-        along = of_stretch[member] * rng.standard_normal((count, 1)) * gaze[member, 0].numpy()
-        around = of_gaze[member] * rng.standard_normal((count, 2))
-        near = of_place[member] * rng.standard_normal((count, 2))
-        places = line[member, at] + STRETCHES.numpy()[at, None] * (along + around) + near
+        at = np.minimum(at, shares.shape[1] - 1)
+        of_stretch, of_gaze, of_place = (
+            np.sqrt(variance[member, 0])
+            for variance in (mixture.of_stretch, mixture.of_gaze, mixture.of_place)
+        )
+        line = np.stack(mixture.on_line(*coded.gaze), axis=-1)[member, 0, at]
+        gaze = np.concatenate(coded.gaze, axis=-1)[member, 0]
+        off = of_stretch * rng.standard_normal((count, 1)) * gaze
+        off += of_gaze * rng.standard_normal((count, 2))
+        places = line + mixture.stretches[at, None] * off
+        places += of_place * rng.standard_normal((count, 2))
         return np.asarray(face_at, float) + places * ANGLE_SCALE_RAD
 
     def log_density(
@@ -81,49 +73,56 @@ class GazeLineBelief:
     ) -> NDArray[np.float64]:
         """log p [of 1 / rad^2] of directions (m, 2) given each of faces (n, 30, 25): (n, m)."""
         places = np.asarray(directions, float).reshape(-1, 2) - np.asarray(face_at, float)
-        with torch.no_grad():
-            forms = self._network.forms(self._gaze(faces))
-        return self._mixed(forms, places) - 2 * np.log(ANGLE_SCALE_RAD)
+        forms = self._forms(self._gaze(faces))
+        return self._mixed(forms, places / ANGLE_SCALE_RAD) - 2 * np.log(ANGLE_SCALE_RAD)
 
     def _code(self, face: ArrayLike) -> '_Coded':
         """One face is asked about on every image of a trial: coded once."""
         if self._coded is None or self._coded.face is not face:
+            gaze = self._gaze(face)
+            forms = self._forms(gaze)
             surest = int(np.argmax(self._log_weights))
-            with torch.no_grad():
-                gaze = self._gaze(face)
-                forms, line = self._network.forms(gaze), self._network.on_line(gaze)[surest, 0]
-            guesses = line.numpy().astype(float) * ANGLE_SCALE_RAD
+            guesses = np.stack(self._mixture.on_line(*gaze), axis=-1)[surest, 0]
             density = self._mixed(forms, guesses)[0]
             best = int(np.argmax(density))
-            self._coded = _Coded(face, gaze, forms, guesses[best], float(density[best]))
+            best_guess = guesses[best] * ANGLE_SCALE_RAD
+            self._coded = _Coded(face, gaze, forms, best_guess, float(density[best]))
         return self._coded
 
-    def _gaze(self, faces: ArrayLike) -> torch.Tensor:
-        """u, (members, n, 2)."""
+    def _gaze(self, faces: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """u of n faces, pan and tilt, each (members, n, 1)."""
         pictures = np.array(faces, np.uint8).reshape(-1, 1, *np.shape(faces)[-2:])
         with torch.no_grad():
-            return self._network.gaze(standardised(pictures))
+            gaze = self._network.gaze(standardised(pictures)).numpy().astype(float)
+        return gaze[..., :1], gaze[..., 1:]
 
-    def _mixed(self, forms: torch.Tensor, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """log p of places (m, 2) [rad], given the forms of n gazes: (n, m)."""
-        scaled = torch.from_numpy((places / ANGLE_SCALE_RAD).astype(np.float32))
-        with torch.no_grad():
-            density = torch.logsumexp(quadratic(scaled) @ forms, dim=-1).numpy().astype(float)
-        return np.logaddexp.reduce(density + self._log_weights[:, None, None], axis=0)
+    def _forms(self, gaze: tuple[NDArray[np.float64], NDArray[np.float64]]) -> NDArray[np.float64]:
+        """(members, n, 6, stretches)."""
+        return np.stack(self._mixture.forms(*gaze, np.log), axis=2)
+
+    def _mixed(
+        self, forms: NDArray[np.float64], places: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """log p of places (m, 2), given the forms of n gazes: (n, m)."""
+        parts = np.stack(powers(*places.T), axis=-1) @ forms
+        parts += self._log_weights[:, None, None, None]
+        return np.logaddexp.reduce(parts, axis=(0, 3))
 
 
 @dataclass(frozen=True)
 class _Coded:
-    """What one face says: its gazes u (members, 1, 2), their forms, and the best guess (2,) [rad]
-    on the line of gaze of the surest member, with its log density.
+    """What one face says: its gazes, pan and tilt, and their forms.
+
+    `best_guess`: (2,) [rad] on the line of gaze of the surest member.
     """
 
     face: ArrayLike
-    gaze: torch.Tensor
-    forms: torch.Tensor
+    gaze: tuple[NDArray[np.float64], NDArray[np.float64]]
+    forms: NDArray[np.float64]
     best_guess: NDArray[np.float64]
     log_density_there: float
 
 
-def _normalised(shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    return shares / shares.sum()
+def _numpy(mixture: LineMixture[torch.Tensor]) -> LineMixture[NDArray[np.float64]]:
+    arrays = {name: value.detach().numpy().astype(float) for name, value in vars(mixture).items()}
+    return LineMixture(**arrays)

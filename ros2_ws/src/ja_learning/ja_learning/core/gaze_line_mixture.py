@@ -1,0 +1,63 @@
+"""Where on the line of a gaze is what she means? A mixture over stretches of it, as arithmetic.
+
+    p(c | face) = sum_k w_k N(c; o + r_k u, r_k^2 (s_r^2 u u^T + s_u^2 I) + s_c^2 I),  u = u(face)
+
+With torch it is learned, with numpy it is asked: torch lets go of the interpreter in each of its
+operations, and whoever must answer soon would then wait for the thread that learns.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+Array = TypeVar('Array', torch.Tensor, NDArray[np.float64])
+
+
+@dataclass(frozen=True)
+class LineMixture(Generic[Array]):
+    """All the numbers of p(c | face) but the gaze; shapes broadcast to (members, n, stretches).
+
+    `stretches`: r_k; `log_shares`: log w_k; `origin_tilt`: of o; `of_stretch`, `of_gaze`,
+    `of_place`: the variances s_r^2, s_u^2, s_c^2. Members have the first axis.
+    """
+
+    stretches: Array
+    log_shares: Array
+    origin_tilt: Array
+    of_stretch: Array
+    of_gaze: Array
+    of_place: Array
+
+    def on_line(self, pan: Array, tilt: Array) -> tuple[Array, Array]:
+        """o + r_k u for gazes (members, n, 1): (members, n, stretches), pan and tilt."""
+        return self.stretches * pan, self.origin_tilt + self.stretches * tilt
+
+    def forms(self, pan: Array, tilt: Array, log: Callable[[Array], Array]) -> list[Array]:
+        """Factors of `powers(c)` in log w_k N(c; ...): six arrays (members, n, stretches).
+
+        For gazes (members, n, 1); `log`: of the library that the arrays are of. To weigh many
+        places, the largest work of a lesson, is then one product of matrices.
+        """
+        squared = self.stretches**2
+        across, further = squared * self.of_gaze + self.of_place, squared * self.of_stretch
+        along = across + further * (pan**2 + tilt**2)
+        # Of the covariance `across` I + `further` u u^T the inverse, by Sherman and Morrison.
+        less = further / along
+        pans = (1 - less * pan**2) / across
+        tilts = (1 - less * tilt**2) / across
+        both = -less * pan * tilt / across
+        at_pan, at_tilt = self.on_line(pan, tilt)
+        to_pan, to_tilt = pans * at_pan + both * at_tilt, both * at_pan + tilts * at_tilt
+        peak = self.log_shares - 0.5 * log(across * along) - math.log(2 * math.pi)
+        at_zero = peak - 0.5 * (at_pan * to_pan + at_tilt * to_tilt)
+        return [at_zero, to_pan, to_tilt, -0.5 * pans, -both, -0.5 * tilts]
+
+
+def powers(pan: Array, tilt: Array) -> list[Array]:
+    """What the quadratic forms of a place are made of."""
+    return [pan**0, pan, tilt, pan**2, pan * tilt, tilt**2]
