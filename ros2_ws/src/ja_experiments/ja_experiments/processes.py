@@ -9,7 +9,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import Any, TypeVar
 
 import torch
-from rich.progress import Progress
+
+from ja_experiments.progress import Progress
 
 Result = TypeVar('Result')
 
@@ -24,11 +25,10 @@ def side_by_side(
         ProcessPoolExecutor(
             os.cpu_count(), spawn, initializer=torch.set_num_threads, initargs=(1,)
         ) as pool,
-        Progress(transient=True) as progress,
+        Progress().bar(title, len(every)) as advance,
     ):
-        bar = progress.add_task(title, total=len(every))
         futures = [pool.submit(run, *task) for task in every]
         for future in as_completed(futures):
             future.result()  # an error ends the whole
-            progress.advance(bar)
+            advance(1)
         return [future.result() for future in futures]

@@ -1,4 +1,4 @@
-"""A bar on the terminal for everything that takes time."""
+"""A bar on the terminal for everything that takes time; where there is none, a line a tenth."""
 
 from __future__ import annotations
 
@@ -29,6 +29,21 @@ class Progress:
             MofNCompleteColumn(),
             TimeRemainingColumn(elapsed_when_finished=True),
         )
+        if not self._console.is_terminal:
+            yield self._tenths(label, total)
+            return
         with RichProgress(*columns, console=self._console) as bars:
             task = bars.add_task(label, total=total)
             yield lambda done: bars.advance(task, done)
+
+    def _tenths(self, label: str, total: int) -> Callable[[int], None]:
+        done, said = 0, 0
+
+        def advance(more: int) -> None:
+            nonlocal done, said
+            done += more
+            if 10 * done // total > said:
+                said = 10 * done // total
+                self.say(f'{label}: {done} of {total}')
+
+        return advance
