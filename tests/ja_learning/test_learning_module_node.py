@@ -1,5 +1,6 @@
 """`learning_module`: proposes while a trial is under way, learns once a fixation, remembers."""
 
+import os
 from contextlib import contextmanager
 
 import numpy as np
@@ -409,3 +410,14 @@ def test_a_trial_that_was_given_up_is_learned_by_who_needs_no_fixation(make_life
     life.rest(0.3, [BALL])
     life.look()
     life.bench.wait(lambda: life.learned == 1)
+
+
+def test_who_may_not_answer_before_all_else_says_so_and_answers(make_life, monkeypatch):
+    def refuse(*_):
+        raise PermissionError(1, 'Operation not permitted')
+
+    monkeypatch.setattr(os, 'sched_setscheduler', refuse)
+    life = make_life(realtime_priority=5)
+    said = life.bench.node.health.values['real-time priority']
+    assert said.startswith('none: real-time priority 5 is not allowed to this user: be root')
+    assert life.look().name

@@ -8,6 +8,7 @@ from std_srvs.srv import Trigger
 
 from ja_common.core.health import Level
 from ja_common.graph_node import GraphNode
+from ja_common.realtime import go_as_any_program
 from ja_learning.core.background_learner import BackgroundLearner
 from ja_learning.core.checkpoint_folder import CheckpointConfig, CheckpointFolder
 from ja_learning.core.learner import Learner, Predictor
@@ -97,7 +98,8 @@ class KeptLearner:
         return CheckpointFolder(self._node.folder_of_its_own(config.checkpoint_folder), config)
 
     def _at_work(self, learner: Learner) -> BackgroundLearner:
-        return BackgroundLearner(learner, self._after_lesson, self._behind)
+        # A lesson is not urgent, even where answers are (`realtime_priority`).
+        return BackgroundLearner(learner, self._after_lesson, self._behind, go_as_any_program)
 
     def _replace(self, learner: Learner) -> None:
         self._lessons.close(0.0)

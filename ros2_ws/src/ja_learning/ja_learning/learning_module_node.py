@@ -13,6 +13,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from ja_common.core.config import parameter
 from ja_common.core.detection import caregiver_face, objects
+from ja_common.core.health import Level
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_common.core.stamp_join import StampJoin
 from ja_common.core.turns import Turns
@@ -22,6 +23,7 @@ from ja_common.image_codec import decode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.point_cloud_codec import encode_columns
 from ja_common.posture_listener import PostureListener
+from ja_common.realtime import go_before_all_else
 from ja_common.time_codec import to_ns
 from ja_common.topics import (
     BELIEF,
@@ -55,6 +57,12 @@ class LearningModuleConfig:
     still_below_rad_s: float = parameter(
         STILL_BELOW_RAD_S, 'a joint slower than this stands still', low=1e-4, high=5.0
     )
+    realtime_priority: int = parameter(
+        0,
+        'answer before all ordinary programs of the machine, in this process and with this '
+        'priority (SCHED_RR; lessons excepted); 0: as any program',
+        low=0, high=99,
+    )  # fmt: skip
 
 
 class LearningModuleNode(GraphNode):
@@ -94,12 +102,23 @@ class LearningModuleNode(GraphNode):
         self._belief_random = np.random.default_rng(self._config.seed)
         self.offer(Trigger, 'reset_learning', self._on_reset)
         self.offer(SetBool, 'learning_enabled', self._on_learning_enabled)
+        if self._config.realtime_priority:
+            self._answer_before_all_else()
 
     def untaught(self) -> Learner:
         """The learner that this node teaches, before its first lesson."""
         return make_learner(
             self._choice, self._network_config, self._gaze_line_config, self._config.seed
         )
+
+    def _answer_before_all_else(self) -> None:
+        said = str(self._config.realtime_priority)
+        try:
+            go_before_all_else(self._config.realtime_priority)
+        except OSError as error:
+            said = f'none: {error}'
+            self.problem('realtime_priority', str(error), Level.WARN)
+        self.health.values['real-time priority'] = said
 
     def _choose(self, choice: LearnerChoice) -> None:
         if choice != self._choice:

@@ -3,9 +3,10 @@
 The learning module runs in a process of its own at 30 images/s; this process plays the camera, the
 detector and the evaluator, and holds the watch: from the detections' publication to the delta's
 arrival, both journeys included. Every five images are a trial of a random face, which is learned;
-every ten trials a checkpoint is written.
+every ten trials a checkpoint is written. Once more with `realtime_priority`, where it is allowed.
 """
 
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -46,6 +47,8 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     'not learning': {'learning_enabled_at_start': False},
     'learning': {},
     'always learning': {'replay_steps': MANY_STEPS},
+    'learning, real-time priority': {'realtime_priority': 1},
+    'always learning, real-time priority': {'replay_steps': MANY_STEPS, 'realtime_priority': 1},
 }
 
 
@@ -55,6 +58,9 @@ def run() -> dict[str, Row]:
     rows: dict[str, Row] = {}
     for name, parameters in CONDITIONS.items():
         watch = _measure(parameters)
+        if watch.refused:
+            print(f'{name}: not measured: {watch.refused}', file=sys.stderr)
+            continue
         delays_ms = np.array(watch.delays_ms[WARM_UP_IMAGES:])
         rows |= {
             f'delay, median, {name}': row(delays_ms, 'ms', np.median),
@@ -95,6 +101,7 @@ class _Watch(GraphNode):
         self._answered: tuple[int, float] = (0, 0.0)
         self.delays_ms: list[float] = []
         self.trials = self.waiting = 0
+        self.refused = ''
         self.hear(LM_DELTA, self._on_delta)
         self.hear(DIAGNOSTICS, self._on_diagnostics)
 
@@ -148,6 +155,8 @@ class _Watch(GraphNode):
             values = status_values(status)
             self.trials = int(values.get('trials learned', self.trials))
             self.waiting = int(values.get('of these still waiting', self.waiting))
+            priority = values.get('real-time priority', '')
+            self.refused = priority if priority.startswith('none') else self.refused
 
 
 def _detection(kind: Kind, ray: NDArray[np.float64]) -> Detection:

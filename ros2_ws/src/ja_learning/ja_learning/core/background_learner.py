@@ -20,13 +20,17 @@ class BackgroundLearner:
     """
 
     def __init__(
-        self, learner: Learner, learned: Callable[[Learner], None], behind: int | None = None
+        self,
+        learner: Learner,
+        learned: Callable[[Learner], None],
+        behind: int | None = None,
+        begins: Callable[[], None] = lambda: None,
     ) -> None:
-        """`learned` is called after every lesson, in the thread that learns."""
+        """In the thread that learns `begins` is called first, `learned` after every lesson."""
         self._learner = learner
         self._learned = learned
         self._behind = behind
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix='learner')
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix='learner', initializer=begins)
         self._lessons: deque[Future[Predictor]] = deque()
         self._predictor: Predictor = learner.snapshot()
         self._troubles: deque[Exception] = deque()

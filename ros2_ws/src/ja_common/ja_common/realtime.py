@@ -1,0 +1,29 @@
+"""Before all ordinary programs of the machine: for a process that must answer in time."""
+
+import contextlib
+import os
+from pathlib import Path
+
+
+def go_before_all_else(priority: int) -> None:
+    """Schedule all threads of this process, and those that they start, as real-time (SCHED_RR).
+
+    `priority`: 1-99. Raises OSError with one sentence where that is not to be had.
+    """
+    if not hasattr(os, 'sched_setscheduler'):
+        raise OSError('real-time priority is not to be had on this system: as any program')
+    try:
+        for thread in Path('/proc/self/task').iterdir():
+            with contextlib.suppress(ProcessLookupError):  # it has ended meanwhile
+                os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(priority))
+    except PermissionError:
+        raise PermissionError(
+            f'real-time priority {priority} is not allowed to this user: be root, or raise '
+            'rtprio in /etc/security/limits.conf; until then as any program'
+        ) from None
+
+
+def go_as_any_program() -> None:
+    """The calling thread alone, whatever the thread that started it is."""
+    if hasattr(os, 'sched_setscheduler'):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

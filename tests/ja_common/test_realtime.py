@@ -1,0 +1,39 @@
+"""Real-time priority: of a process of its own, as it changes all threads there are."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+PROGRAM = """
+import json, os, threading
+from concurrent.futures import ThreadPoolExecutor
+from ja_common.realtime import go_as_any_program, go_before_all_else
+
+def policy():
+    return os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
+
+old = ThreadPoolExecutor(1)
+old.submit(policy).result()
+try:
+    go_before_all_else(7)
+except PermissionError as error:
+    print(json.dumps(str(error)))
+else:
+    urgent, calm = ThreadPoolExecutor(1), ThreadPoolExecutor(1, initializer=go_as_any_program)
+    print(json.dumps([policy(), *(pool.submit(policy).result() for pool in (old, urgent, calm))]))
+"""
+
+
+def test_all_threads_go_before_all_else_but_who_wants_to_be_as_any_program():
+    ran = subprocess.run(
+        [sys.executable, '-c', PROGRAM], capture_output=True, text=True, timeout=60, check=True
+    )
+    said = json.loads(ran.stdout)
+    if isinstance(said, str):
+        assert said.startswith('real-time priority 7 is not allowed to this user: be root')
+        pytest.skip('this user may not')
+    urgent = [os.SCHED_RR, 7]
+    assert said == [urgent, urgent, urgent, [os.SCHED_OTHER, 0]]
