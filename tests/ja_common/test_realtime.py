@@ -8,7 +8,7 @@ import sys
 import pytest
 
 PROGRAM = """
-import json, os, threading
+import json, os
 from concurrent.futures import ThreadPoolExecutor
 from ja_common.realtime import go_as_any_program, go_before_all_else
 

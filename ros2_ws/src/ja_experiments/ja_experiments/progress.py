@@ -23,15 +23,15 @@ class Progress:
     @contextmanager
     def bar(self, label: str, total: int) -> Iterator[Callable[[int], None]]:
         """A bar while the block runs; gives what moves it on by so many of `total`."""
+        if not self._console.is_terminal:
+            yield self._tenths(label, total)
+            return
         columns = (
             TextColumn('{task.description}'),
             BarColumn(),
             MofNCompleteColumn(),
             TimeRemainingColumn(elapsed_when_finished=True),
         )
-        if not self._console.is_terminal:
-            yield self._tenths(label, total)
-            return
         with RichProgress(*columns, console=self._console) as bars:
             task = bars.add_task(label, total=total)
             yield lambda done: bars.advance(task, done)

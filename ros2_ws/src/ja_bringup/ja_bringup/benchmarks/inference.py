@@ -58,8 +58,8 @@ def run() -> dict[str, Row]:
     rows: dict[str, Row] = {}
     for name, parameters in CONDITIONS.items():
         watch = _measure(parameters)
-        if watch.refused:
-            print(f'{name}: not measured: {watch.refused}', file=sys.stderr)
+        if watch.priority.startswith('none'):
+            print(f'{name}: not measured: {watch.priority}', file=sys.stderr)
             continue
         delays_ms = np.array(watch.delays_ms[WARM_UP_IMAGES:])
         rows |= {
@@ -101,7 +101,7 @@ class _Watch(GraphNode):
         self._answered: tuple[int, float] = (0, 0.0)
         self.delays_ms: list[float] = []
         self.trials = self.waiting = 0
-        self.refused = ''
+        self.priority = ''
         self.hear(LM_DELTA, self._on_delta)
         self.hear(DIAGNOSTICS, self._on_diagnostics)
 
@@ -155,8 +155,7 @@ class _Watch(GraphNode):
             values = status_values(status)
             self.trials = int(values.get('trials learned', self.trials))
             self.waiting = int(values.get('of these still waiting', self.waiting))
-            priority = values.get('real-time priority', '')
-            self.refused = priority if priority.startswith('none') else self.refused
+            self.priority = values.get('real-time priority', self.priority)
 
 
 def _detection(kind: Kind, ray: NDArray[np.float64]) -> Detection:
