@@ -406,3 +406,23 @@ def test_a_world_that_nobody_closed_ends_without_complaint():
     )
     ran = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stderr) == (0, '')
+
+
+def test_a_world_that_another_thread_still_holds_at_the_end_does_not_complain_either():
+    """As a sim node does that Ctrl-C reaches while its first picture is drawn."""
+    code = (
+        'import atexit, threading\n'
+        'kept, drawn = [], threading.Event()\n'
+        'atexit.register(kept.clear)\n'  # let go of it after OpenGL was shut down
+        'from ja_sim.core.scene import load_scene\n'
+        'from ja_sim.core.world import JointAttentionWorld\n'
+        'def draw():\n'
+        "    kept.append(JointAttentionWorld(load_scene('easy'), 0, (32, 24)))\n"
+        '    kept[0].observe()\n'
+        '    drawn.set()\n'
+        '    threading.Event().wait()\n'
+        'threading.Thread(target=draw, daemon=True).start()\n'
+        'drawn.wait()\n'
+    )
+    ran = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (0, '')

@@ -93,7 +93,8 @@ class Renderer:
 def _free(context: mujoco.MjrContext, gl: Any) -> None:
     try:
         gl.make_current()
+        context.free()
     except Exception:  # the bindings raise whatever the driver gives them
-        return  # the thread that drew has it still: it goes with the process
-    context.free()
+        pass  # the thread that drew has it still: the memory goes with the process
+    # In any case now: the bindings would free it again, and complain, once EGL is shut down.
     gl.free()
