@@ -24,7 +24,7 @@ NODES = [path for path in TREES if path.stem.endswith('_node') and path.stem != 
 HOME_OF = {
     'torch': {'ja_learning', 'ja_experiments'},
     'mujoco': {'ja_sim'},
-    'numba': {'ja_experiments'},
+    'numba': {'ja_experiments', 'ja_learning'},
 }
 
 

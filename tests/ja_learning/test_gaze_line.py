@@ -14,6 +14,7 @@ from ja_learning.core.gaze_line_network import (
     give_member,
     standardised,
 )
+from ja_learning.core.gaze_line_pass import GazeLinePass
 from ja_learning.core.learner import LearnerChoice, make_learner
 from ja_learning.core.network import NetworkConfig
 from ja_learning.core.trial import Trial
@@ -145,6 +146,23 @@ def test_depth_is_uncertain_along_the_line_of_gaze_and_not_across():
     across = gaze[:, :, None] + torch.tensor([-0.25, 0.6])
     with torch.no_grad():
         assert network.log_density(gaze, along).min() > network.log_density(gaze, across).max() + 5
+
+
+@pytest.mark.parametrize(('members', 'channels'), [(1, 3), (3, 8)])
+def test_the_compiled_pass_gives_the_gazes_of_the_network(members, channels):
+    torch.manual_seed(0)
+    network = GazeLineNetwork(members, channels)
+    faces = np.random.default_rng(0).integers(0, 256, (4, 30, 25)).astype(np.uint8)
+    faces[3] = 7  # nothing to be seen in it
+    with torch.no_grad():
+        gaze = network.gaze(standardised(faces[:, None])).numpy()
+    compiled = GazeLinePass(network)
+    assert compiled(faces) == pytest.approx(gaze, abs=1e-6)
+    assert np.ptp(gaze[:, :3], axis=1).min() > 1e-3
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter.add_(1.0)
+    assert compiled(faces) == pytest.approx(gaze, abs=1e-6)
 
 
 def test_who_asks_reckons_as_who_learns():

@@ -36,7 +36,7 @@ from ja_learning.core.gaze_line_network import (
     standardised,
 )
 from ja_learning.core.replay_memory import ReplayMemory
-from ja_learning.core.trial import Trial
+from ja_learning.core.trial import FACE_SHAPE, Trial
 
 # The likelihood is at full strength after so many trials for every pair of candidates: the more
 # there are, the later one may be told from another.
@@ -102,8 +102,11 @@ class GazeLineLearner:
         self._evidence = Evidence(config.members + 1)
         self._alarm = ChangeAlarm()
         self._steps = 0
+        self._belief: GazeLineBelief | None = None
         self.trials = 0
         self.last_error_rad = float('nan')
+        # Whoever asks first would wait for the compiler.
+        self.propose(np.zeros(FACE_SHAPE, np.uint8), np.zeros(2), np.zeros(2), np.empty((0, 2)))
 
     @property
     def log_evidence(self) -> float:
@@ -112,31 +115,32 @@ class GazeLineLearner:
 
     def snapshot(self) -> GazeLineBelief:
         """What is believed now; what is learned later leaves it as it is."""
-        return self._believed(copy.deepcopy(self._mean))
+        return self._believed()
 
     def propose(
         self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike
     ) -> NDArray[np.float64]:
         """Change of posture (2,) [rad] towards what she most probably means; as in `Predictor`."""
-        return self._believed(self._mean).propose(face, face_at, posture, candidates)
+        return self._believed().propose(face, face_at, posture, candidates)
 
     def belief(
         self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
     ) -> NDArray[np.float64]:
         """Directions (count, 2) [rad] drawn from the belief about what she means."""
-        return self._believed(self._mean).belief(face, face_at, rng, count)
+        return self._believed().belief(face, face_at, rng, count)
 
     def log_density(
         self, faces: ArrayLike, face_at: ArrayLike, directions: ArrayLike
     ) -> NDArray[np.float64]:
         """log p [of 1 / rad^2] of directions (m, 2) given each of faces (n, 30, 25): (n, m)."""
-        return self._believed(self._mean).log_density(faces, face_at, directions)
+        return self._believed().log_density(faces, face_at, directions)
 
     def learn(self, trial: Trial) -> None:
         """Weigh a trial by what is believed, remember it, and replay some of those lived."""
         self.trials += 1
         if not len(trial.candidates):
             return
+        self._belief = None
         places = ((trial.candidates - trial.face_at) / ANGLE_SCALE_RAD).astype(np.float32)
         changed = False
         if trial.seen_before_shift:
@@ -150,14 +154,17 @@ class GazeLineLearner:
         if self.trials % _COMPARED_EVERY_TRIALS == 0:
             self._replace_the_beaten()
 
-    def _believed(self, network: GazeLineNetwork) -> GazeLineBelief:
-        return GazeLineBelief(
-            network,
-            self._log_weights(),
-            self.log_evidence,
-            self.config.top_down,
-            self.config.plausible_within_nats,
-        )
+    def _believed(self) -> GazeLineBelief:
+        """The belief after the last lesson, made when it is first asked for."""
+        if self._belief is None:
+            self._belief = GazeLineBelief(
+                self._mean,
+                self._log_weights(),
+                self.log_evidence,
+                self.config.top_down,
+                self.config.plausible_within_nats,
+            )
+        return self._belief
 
     def _log_weights(self) -> NDArray[np.float64]:
         nats = self._evidence.nats[:-1]
@@ -358,7 +365,7 @@ class GazeLineLearner:
                 self._optimiser.state[p] = {
                     k: torch.from_numpy(np.array(v)) for k, v in kept.items()
                 }
-        self._steps, self.trials = steps, trials
+        self._steps, self.trials, self._belief = steps, trials, None
         self._annealing, self._began = annealing, began
         self._alarm.doubt, self._alarm.doubtful_trials = doubt, doubtful
 

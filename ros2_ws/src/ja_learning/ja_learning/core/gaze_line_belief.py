@@ -7,11 +7,12 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 
 from ja_learning.core.gaze_line_mixture import LineMixture, powers
-from ja_learning.core.gaze_line_network import ANGLE_SCALE_RAD, GazeLineNetwork, standardised
+from ja_learning.core.gaze_line_network import ANGLE_SCALE_RAD, GazeLineNetwork
+from ja_learning.core.gaze_line_pass import GazeLinePass
 
 
 class GazeLineBelief:
-    """A mixture of the members of a network, each with its weight.
+    """A mixture of the members of a network as it is now, each with its weight.
 
     `top_down`: propose the most probable of the objects seen, where one is plausible; else always
     the best guess on the line of gaze. `plausible_within_nats`: how much less probable than the
@@ -26,8 +27,8 @@ class GazeLineBelief:
         top_down: bool,
         plausible_within_nats: float,
     ) -> None:
-        self._network, self._log_weights = network, log_weights
-        self._mixture = _numpy(network.mixture())
+        self._log_weights = log_weights
+        self._pass, self._mixture = GazeLinePass(network), _numpy(network.mixture())
         self._top_down, self._plausible_within = top_down, plausible_within_nats
         self.log_evidence = log_evidence
         self._coded: _Coded | None = None
@@ -91,9 +92,7 @@ class GazeLineBelief:
 
     def _gaze(self, faces: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """u of n faces, pan and tilt, each (members, n, 1)."""
-        pictures = np.array(faces, np.uint8).reshape(-1, 1, *np.shape(faces)[-2:])
-        with torch.no_grad():
-            gaze = self._network.gaze(standardised(pictures)).numpy().astype(float)
+        gaze = self._pass(np.reshape(faces, (-1, *np.shape(faces)[-2:])))
         return gaze[..., :1], gaze[..., 1:]
 
     def _forms(self, gaze: tuple[NDArray[np.float64], NDArray[np.float64]]) -> NDArray[np.float64]:

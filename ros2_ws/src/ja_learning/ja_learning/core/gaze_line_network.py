@@ -23,7 +23,7 @@ ANGLE_SCALE_RAD = float(np.radians(40))
 STRETCHES = torch.exp(torch.linspace(np.log(0.35), np.log(2.2), 9))
 _HIDDEN = 64
 # Of the pixels, 0-255, of a face that is not to be blown up.
-_LEAST_VARIANCE = 0.06
+LEAST_VARIANCE = 0.06
 
 
 class GazeLineNetwork(nn.Module):
@@ -114,9 +114,7 @@ class GazeLineNetwork(nn.Module):
 def standardised(faces: NDArray[np.uint8] | torch.Tensor) -> torch.Tensor:
     """Faces uint8 (..., 30, 25), each with mean 0 and deviation 1."""
     # One operation for a handful: each costs a proposal more than all it computes.
-    return nn.functional.layer_norm(
-        torch.as_tensor(faces).float(), FACE_SHAPE, eps=_LEAST_VARIANCE
-    )
+    return nn.functional.layer_norm(torch.as_tensor(faces).float(), FACE_SHAPE, eps=LEAST_VARIANCE)
 
 
 def give_member(tensor: torch.Tensor, members: int, giver: int, taker: int) -> None:
