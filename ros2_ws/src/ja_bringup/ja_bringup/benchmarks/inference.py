@@ -4,6 +4,10 @@ The learning module runs in a process of its own at 30 images/s; this process pl
 detector and the evaluator, and holds the watch: from the detections' publication to the delta's
 arrival, both journeys included. Every five images are a trial of a random face, which is learned;
 every ten trials a checkpoint is written. Once more with `realtime_priority`, where it is allowed.
+
+The watch goes before all ordinary programs, the learner among them, where it may: how late it is
+itself on a busy machine is not to be measured. A program that only burned 60 ms of processor time
+six times a second took the 99th percentile of a learner that did not learn from 3.0 to 6 ms.
 """
 
 import sys
@@ -32,6 +36,7 @@ from ja_common.detection_codec import encode_detections
 from ja_common.graph_node import GraphNode
 from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.realtime import go_as_any_program, go_before_all_else
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import DETECTIONS, DIAGNOSTICS, FACE_IMAGE, FIXATION, JOINT_STATES, LM_DELTA
@@ -41,6 +46,8 @@ WARM_UP_IMAGES, IMAGES = 60, 600
 IMAGES_A_TRIAL = 5
 OBJECTS = 5
 PATIENCE_S = 5.0
+# Above that of the learner in some of the conditions.
+WATCH_PRIORITY = 2
 # So many that a lesson lasts longer than a trial.
 MANY_STEPS = 12
 CONDITIONS: dict[str, dict[str, Any]] = {
@@ -73,6 +80,7 @@ def run() -> dict[str, Row]:
 
 
 def _measure(parameters: dict[str, Any]) -> '_Watch':
+    go_as_any_program()  # the learner is started as this thread is
     with own_executor() as executor, TemporaryDirectory() as folder:
         watch = _Watch(context=executor.context)
         executor.add_node(watch)
@@ -109,6 +117,7 @@ class _Watch(GraphNode):
         """The measurement in steps; the caller spins between them."""
         while not all(each.get_subscription_count() for each in self._say.values()):
             yield 'waiting for the learner'
+        _go_before_the_learner()
         due_s = time.monotonic()
         for number in range(WARM_UP_IMAGES + IMAGES):
             while time.monotonic() < due_s:
@@ -156,6 +165,13 @@ class _Watch(GraphNode):
             self.trials = int(values.get('trials learned', self.trials))
             self.waiting = int(values.get('of these still waiting', self.waiting))
             self.priority = values.get('real-time priority', self.priority)
+
+
+def _go_before_the_learner() -> None:
+    try:
+        go_before_all_else(WATCH_PRIORITY)
+    except OSError as error:
+        print(f'how late the watch is itself is measured too: {error}', file=sys.stderr)
 
 
 def _detection(kind: Kind, ray: NDArray[np.float64]) -> Detection:
