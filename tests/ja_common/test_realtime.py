@@ -10,7 +10,7 @@ import pytest
 PROGRAM = """
 import json, os
 from concurrent.futures import ThreadPoolExecutor
-from ja_common.realtime import go_as_any_program, go_before_all_else
+from ja_common.realtime import go_as_any_program, go_back_among_all, go_before_all_else
 
 def policy():
     return os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
@@ -23,7 +23,10 @@ except PermissionError as error:
     print(json.dumps(str(error)))
 else:
     urgent, calm = ThreadPoolExecutor(1), ThreadPoolExecutor(1, initializer=go_as_any_program)
-    print(json.dumps([policy(), *(pool.submit(policy).result() for pool in (old, urgent, calm))]))
+    pools = old, urgent, calm
+    said = [policy(), *(pool.submit(policy).result() for pool in pools)]
+    go_back_among_all()
+    print(json.dumps([said, [policy(), *(pool.submit(policy).result() for pool in pools)]]))
 """
 
 
@@ -35,5 +38,6 @@ def test_all_threads_go_before_all_else_but_who_wants_to_be_as_any_program():
     if isinstance(said, str):
         assert said.startswith('real-time priority 7 is not allowed to this user: be root')
         pytest.skip('this user may not')
-    urgent = [os.SCHED_RR, 7]
-    assert said == [urgent, urgent, urgent, [os.SCHED_OTHER, 0]]
+    urgent, calm = [os.SCHED_RR, 7], [os.SCHED_OTHER, 0]
+    assert said[0] == [urgent, urgent, urgent, calm]
+    assert said[1] == [calm] * 4

@@ -392,6 +392,11 @@ def test_osmesa_is_the_fallback(monkeypatch):
     assert graphics.backend() == 'osmesa'
 
 
+def assert_ends_without_complaint(code):
+    ran = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (0, '')
+
+
 def test_a_world_that_nobody_closed_ends_without_complaint():
     """Also where another library registered finalizers first: they run in the reverse order."""
     code = (
@@ -404,8 +409,7 @@ def test_a_world_that_nobody_closed_ends_without_complaint():
         "world = JointAttentionWorld(load_scene('easy'), 0, (32, 24))\n"
         'world.observe()\n'
     )
-    ran = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=False)
-    assert (ran.returncode, ran.stderr) == (0, '')
+    assert_ends_without_complaint(code)
 
 
 def test_a_world_that_another_thread_still_holds_at_the_end_does_not_complain_either():
@@ -424,5 +428,4 @@ def test_a_world_that_another_thread_still_holds_at_the_end_does_not_complain_ei
         'threading.Thread(target=draw, daemon=True).start()\n'
         'drawn.wait()\n'
     )
-    ran = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=False)
-    assert (ran.returncode, ran.stderr) == (0, '')
+    assert_ends_without_complaint(code)

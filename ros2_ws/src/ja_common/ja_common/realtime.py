@@ -13,9 +13,7 @@ def go_before_all_else(priority: int) -> None:
     if not hasattr(os, 'sched_setscheduler'):
         raise OSError('real-time priority is not to be had on this system: as any program')
     try:
-        for thread in Path('/proc/self/task').iterdir():
-            with contextlib.suppress(ProcessLookupError):  # it has ended meanwhile
-                os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(priority))
+        _schedule_all_threads(os.SCHED_RR, priority)
     except PermissionError:
         raise PermissionError(
             f'real-time priority {priority} is not allowed to this user: be root, or raise '
@@ -23,7 +21,19 @@ def go_before_all_else(priority: int) -> None:
         ) from None
 
 
+def go_back_among_all() -> None:
+    """All threads of this process, after `go_before_all_else`."""
+    if hasattr(os, 'sched_setscheduler'):
+        _schedule_all_threads(os.SCHED_OTHER, 0)
+
+
 def go_as_any_program() -> None:
     """The calling thread alone, whatever the thread that started it is."""
     if hasattr(os, 'sched_setscheduler'):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
+def _schedule_all_threads(policy: int, priority: int) -> None:
+    for thread in Path('/proc/self/task').iterdir():
+        with contextlib.suppress(ProcessLookupError):  # it has ended meanwhile
+            os.sched_setscheduler(int(thread.name), policy, os.sched_param(priority))

@@ -114,26 +114,34 @@ class GazeLineLearner:
         return float(self._evidence.nats[-1])
 
     def snapshot(self) -> GazeLineBelief:
-        """What is believed now; what is learned later leaves it as it is."""
-        return self._believed()
+        """What is believed now, made when first asked for; what is learned later leaves it."""
+        if self._belief is None:
+            self._belief = GazeLineBelief(
+                self._mean,
+                self._log_weights(),
+                self.log_evidence,
+                self.config.top_down,
+                self.config.plausible_within_nats,
+            )
+        return self._belief
 
     def propose(
         self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike
     ) -> NDArray[np.float64]:
         """Change of posture (2,) [rad] towards what she most probably means; as in `Predictor`."""
-        return self._believed().propose(face, face_at, posture, candidates)
+        return self.snapshot().propose(face, face_at, posture, candidates)
 
     def belief(
         self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
     ) -> NDArray[np.float64]:
         """Directions (count, 2) [rad] drawn from the belief about what she means."""
-        return self._believed().belief(face, face_at, rng, count)
+        return self.snapshot().belief(face, face_at, rng, count)
 
     def log_density(
         self, faces: ArrayLike, face_at: ArrayLike, directions: ArrayLike
     ) -> NDArray[np.float64]:
         """log p [of 1 / rad^2] of directions (m, 2) given each of faces (n, 30, 25): (n, m)."""
-        return self._believed().log_density(faces, face_at, directions)
+        return self.snapshot().log_density(faces, face_at, directions)
 
     def learn(self, trial: Trial) -> None:
         """Weigh a trial by what is believed, remember it, and replay some of those lived."""
@@ -153,18 +161,6 @@ class GazeLineLearner:
             self._step(coldness)
         if self.trials % _COMPARED_EVERY_TRIALS == 0:
             self._replace_the_beaten()
-
-    def _believed(self) -> GazeLineBelief:
-        """The belief after the last lesson, made when it is first asked for."""
-        if self._belief is None:
-            self._belief = GazeLineBelief(
-                self._mean,
-                self._log_weights(),
-                self.log_evidence,
-                self.config.top_down,
-                self.config.plausible_within_nats,
-            )
-        return self._belief
 
     def _log_weights(self) -> NDArray[np.float64]:
         nats = self._evidence.nats[:-1]

@@ -113,7 +113,6 @@ class GazeLineNetwork(nn.Module):
 
 def standardised(faces: NDArray[np.uint8] | torch.Tensor) -> torch.Tensor:
     """Faces uint8 (..., 30, 25), each with mean 0 and deviation 1."""
-    # One operation for a handful: each costs a proposal more than all it computes.
     return nn.functional.layer_norm(torch.as_tensor(faces).float(), FACE_SHAPE, eps=LEAST_VARIANCE)
 
 

@@ -1,9 +1,9 @@
 """What a face says of her gaze, in one compiled pass: `GazeLineNetwork.gaze` for who must answer.
 
 Torch learns. To answer with it takes forty operations, each of which costs more than all that it
-computes when another thread has had the caches since, and asks for the interpreter anew, while
-that thread learns: a quarter of the time of this one (`./ja bench inference`). A test holds the
-two together.
+computes when another thread has had the caches since, and asks for the interpreter anew while
+that thread learns: four times as long as this pass (docs/learner.md). A test holds the two
+together.
 """
 
 import numpy as np
@@ -30,11 +30,11 @@ class GazeLinePass:
         channels = convolutions[-1].out_channels // members
         hidden = _array(network.hidden_weights)
         by_channel = hidden.reshape(members, channels, -1, hidden.shape[-1])
-        by_place = by_channel.transpose(0, 2, 1, 3).reshape(hidden.shape)
+        hidden = by_channel.transpose(0, 2, 1, 3).reshape(hidden.shape)
         self._layers: tuple[_Layer, ...] = (
             (weights, first[1].ravel()),
             *others,
-            (np.ascontiguousarray(by_place), _array(network.hidden_biases)[:, 0]),
+            (hidden, _array(network.hidden_biases)[:, 0]),
             (_array(network.gaze_weights), _array(network.gaze_biases)[:, 0]),
         )
 
@@ -48,7 +48,7 @@ def _convolution(layer: nn.Conv2d, members: int) -> _Layer:
     outputs, inputs, rows, columns = weights.shape
     weights = weights.reshape(members, outputs // members, inputs, rows, columns)
     weights = weights.transpose(0, 3, 4, 2, 1).reshape(members, rows * columns * inputs, -1)
-    return np.ascontiguousarray(weights), _array(layer.bias).reshape(members, -1)
+    return weights, _array(layer.bias).reshape(members, -1)
 
 
 def _array(parameter: nn.Parameter | None) -> NDArray[np.float32]:

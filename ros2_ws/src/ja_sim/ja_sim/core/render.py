@@ -93,8 +93,9 @@ class Renderer:
 def _free(context: mujoco.MjrContext, gl: Any) -> None:
     try:
         gl.make_current()
-        context.free()
     except Exception:  # the bindings raise whatever the driver gives them
         pass  # the thread that drew has it still: the memory goes with the process
+    else:
+        context.free()
     # In any case now: the bindings would free it again, and complain, once EGL is shut down.
     gl.free()
