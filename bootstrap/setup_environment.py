@@ -86,12 +86,20 @@ class Environment:
         ros = self.environ.get('AMENT_PREFIX_PATH', '') if sourced else 'wheels'
         steps = [
             Step('environment', fingerprint('{}.{}'.format(*version), ros, str(self.root))),
-            *(Step(lock, fingerprint((locks / lock).read_bytes()))
-              for lock in [*base, 'base.lock']),
-            Step('packages', fingerprint(*(
-                (package / name).read_bytes()
-                for package in self.packages() for name in ('setup.py', 'setup.cfg')
-            ))),
+            *(
+                Step(lock, fingerprint((locks / lock).read_bytes()))
+                for lock in [*base, 'base.lock']
+            ),
+            Step(
+                'packages',
+                fingerprint(
+                    *(
+                        (package / name).read_bytes()
+                        for package in self.packages()
+                        for name in ('setup.py', 'setup.cfg')
+                    )
+                ),
+            ),
         ]
         if dev:
             steps.append(Step('dev.lock', fingerprint((locks / 'dev.lock').read_bytes())))
@@ -120,15 +128,25 @@ class Environment:
             self._write_stamp({})
             self._run([python.executable, '-m', 'venv', '--clear', str(self.folder)])
             asked = shutil.which(self.environ.get('JA_PYTHON', '')) or python.executable
-            self._record('python', {
-                'executable': python.executable, 'version': python.version, 'asked': asked,
-            })
+            self._record(
+                'python',
+                {
+                    'executable': python.executable,
+                    'version': python.version,
+                    'asked': asked,
+                },
+            )
         elif step.name == 'packages':
             self.say('installing the packages of ros2_ws')
-            self._pip('--no-deps', '--no-build-isolation', '--use-pep517',
-                      # A plain path entry: quick to import, and followed by mypy and editors.
-                      '--config-settings', 'editable_mode=compat',
-                      *(part for package in self.packages() for part in ('-e', str(package))))
+            self._pip(
+                '--no-deps',
+                '--no-build-isolation',
+                '--use-pep517',
+                # A plain path entry: quick to import, and followed by mypy and editors.
+                '--config-settings',
+                'editable_mode=compat',
+                *(part for package in self.packages() for part in ('-e', str(package))),
+            )
         else:
             lock = self.root / 'requirements' / step.name
             self.say(f'installing requirements/{step.name} (the first time takes minutes)')
@@ -150,7 +168,10 @@ class Environment:
                 result = subprocess.run(
                     command,
                     env=machine.clean_environ(environ or self.environ),
-                    stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, check=False,
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    check=False,
                 )
             except OSError as error:
                 raise BootstrapError(f'{command[0]} cannot be started: {error}') from error

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from ja_bringup.recording.reader import Recording
 from ja_common.core.detection import Detection, Kind
 from ja_common.core.geometry import rays_of_directions
 from ja_common.core.stamps import NS_PER_S
@@ -11,6 +10,7 @@ from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.point_cloud_codec import encode_columns
 from ja_common.topics import DETECTIONS, FACE_IMAGE, FIXATION, JOINT_STATES, SIM_TRUTH
+from ja_recording.core.reader import Recording
 from ja_sim.truth_codec import FIELDS
 from node_bench import header
 from recordings import write_recording

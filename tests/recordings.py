@@ -6,9 +6,9 @@ from typing import Any
 
 from rclpy.serialization import serialize_message
 
-from ja_bringup.recording.qos_text import offered_text
-from ja_bringup.recording.recording_folder import Channel, Limits, RecordingFolder
+from ja_common.qos_text import offered_text
 from ja_common.topics import Topic
+from ja_recording.recording_folder import Channel, Limits, RecordingFolder
 
 T0_NS = 1_700_000_000_000_000_000
 

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ja_bringup.core.calibration.conductor import Conductor
-from ja_bringup.core.calibration.course import Calibration, CourseConfig, course
+from ja_calibration.core.conductor import Conductor
+from ja_calibration.core.course import Calibration, CourseConfig, course
 from ja_common.core.geometry import head_rotation
 from ja_common.core.posture import PostureHistory
 from ja_control.core.motion_profile import MotionProfile

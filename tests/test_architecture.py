@@ -22,7 +22,7 @@ NODES = [path for path in TREES if path.stem.endswith('_node') and path.stem != 
 
 # A rig's small computer installs what its nodes need, and nothing else.
 HOME_OF = {
-    'torch': {'ja_learning', 'ja_experiments'},
+    'torch': {'ja_learning', 'ja_experiments', 'ja_benchmarks'},
     'mujoco': {'ja_sim'},
     'numba': {'ja_experiments', 'ja_learning'},
 }
@@ -47,7 +47,7 @@ def is_text(node: ast.AST | None) -> bool:
 
 
 def test_sources_were_found():
-    assert len(PACKAGES) == 7
+    assert len(PACKAGES) == 13
     assert len(NODES) >= 8
 
 

@@ -19,15 +19,14 @@ from matplotlib.figure import Figure
 from PIL import Image, ImageDraw, ImageFont
 from rclpy.serialization import deserialize_message
 
-from ja_bringup.recording.message_types import message_class
-from ja_bringup.recording.reader import Recording
-from ja_bringup.status_values import status_values
 from ja_common.core.detection import Detection, Kind
 from ja_common.core.fixation import WIDTH_SIXTH
 from ja_common.core.geometry import angle_between, rays_of_directions
 from ja_common.detection_codec import decode_detections
 from ja_common.image_codec import decode_image
 from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.message_types import message_class
+from ja_common.status_values import status_values
 from ja_common.time_codec import to_ns
 from ja_common.topics import (
     CAMERA_INFO,
@@ -38,6 +37,7 @@ from ja_common.topics import (
     JOINT_STATES,
     SIM_TRUTH,
 )
+from ja_recording.core.reader import Recording
 from ja_sim.truth_codec import decode_truth
 
 OUTPUT = Path(__file__).parents[1] / 'docs' / 'images' / 'demo.webp'

@@ -1,6 +1,6 @@
 """Makes docs/images/demo.png: what the robot sees, beside the success curve of a demo.
 
-    .venv/bin/python tools/make_demo_picture.py runs/<time>-demo/success_curve.png
+.venv/bin/python tools/make_demo_picture.py runs/<time>-demo/success_curve.png
 """
 
 import sys
@@ -9,11 +9,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from ja_common.core.annotate import annotated
+from ja_common.core.camera_model import CameraModel
 from ja_common.core.fixation import WIDTH_SIXTH
 from ja_common.core.posture import Posture
-from ja_perception.core.annotate import annotated
 from ja_perception.core.blazeface import BlazeFace
-from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.detector import SalientFeatureDetector
 from ja_sim.core.scene import load_scene
 from ja_sim.core.world import JointAttentionWorld

@@ -8,8 +8,8 @@ import pytest
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from ja_bringup.graph import NodeSpec
 from ja_common.topics import DIAGNOSTICS
+from ja_runner.graph import NodeSpec
 from ros_testing import spin_until
 
 CONTROLLER = NodeSpec('ja_control', 'visual_feedback_controller')

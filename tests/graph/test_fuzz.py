@@ -10,7 +10,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_srvs.srv import SetBool
 
-from ja_bringup.graph import rig_graph, sim_graph
+from ja_runner.graph import rig_graph, sim_graph
 from ros_testing import spin_until
 
 THINGS = {

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from ja_experiments.config import ExperimentConfig
-from ja_experiments.kernel import FastExperiment
-from ja_experiments.looks import load_looks
+from ja_experiments.datasets.looks import load_looks
+from ja_experiments.paper.kernel import FastExperiment
 from ja_sim.core.scene import load_scene
 
 SEED = 3
@@ -30,7 +30,7 @@ RUNS = 10
 
 def demo_settings() -> dict[str, Any]:
     """What the demo sets of the gate and of the learner, by the parameters' names."""
-    path = resources.files('ja_bringup') / 'config' / 'demo_paper.yaml'
+    path = resources.files('ja_runner') / 'config' / 'demo_paper.yaml'
     nodes = yaml.safe_load(path.read_text(encoding='utf-8'))
     settings = {k: v for node in nodes.values() for k, v in node['ros__parameters'].items()}
     assert settings.pop('learner') == 'paper'

@@ -13,10 +13,10 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.node import Node
 
-from ja_bringup.graph import NodeSpec, sim_graph
-from ja_bringup.supervisor import Supervisor
 from ja_common.executor import KeptWaitSetExecutor
 from ja_common.topics import DIAGNOSTICS
+from ja_runner.graph import NodeSpec, sim_graph
+from ja_runner.supervisor import Supervisor
 
 KILLS = 2
 EVERY_TRIALS = 3

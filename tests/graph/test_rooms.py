@@ -6,16 +6,22 @@ from pathlib import Path
 
 import pytest
 
-from ja_bringup.graph import rig_graph, sim_graph
+from ja_runner.graph import rig_graph, sim_graph
 
 SOURCES = Path(__file__).parents[2] / 'ros2_ws' / 'src'
 MIDDLE = {'ja_perception', 'ja_control', 'ja_learning', 'ja_sim'}
 MAY_IMPORT = {
     'ja_common': set(),
     **{package: {'ja_common'} for package in MIDDLE},
-    'ja_experiments': {'ja_common', *MIDDLE},
-    'ja_bringup': {'ja_common', 'ja_experiments', *MIDDLE},
+    'ja_recording': {'ja_common', *MIDDLE},
+    'ja_dashboard': {'ja_common'},
+    'ja_calibration': {'ja_common', 'ja_control'},
+    'ja_runner': {'ja_common'},
 }
+MAY_IMPORT['ja_experiments'] = {'ja_common', *MIDDLE, 'ja_recording'}
+MAY_IMPORT['ja_diagnostics'] = {'ja_common', *MIDDLE, 'ja_recording', 'ja_runner'}
+MAY_IMPORT['ja_benchmarks'] = {*MAY_IMPORT} - {'ja_benchmarks', 'ja_bringup'}
+MAY_IMPORT['ja_bringup'] = {*MAY_IMPORT} - {'ja_bringup'}
 OURS = set(MAY_IMPORT)
 
 

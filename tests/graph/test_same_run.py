@@ -13,12 +13,12 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from ja_bringup.graph import NodeSpec, sim_graph
-from ja_bringup.one_process import run_in_one_process
-from ja_bringup.supervisor import Supervisor
 from ja_common.executor import KeptWaitSetExecutor
 from ja_common.time_codec import to_ns
 from ja_common.topics import DETECTIONS, IMAGE, JOINT_COMMANDS, LM_DELTA
+from ja_runner.graph import NodeSpec, sim_graph
+from ja_runner.one_process import run_in_one_process
+from ja_runner.supervisor import Supervisor
 
 IMAGES = 150
 WITNESSED: dict[str, Callable[[Any], bytes]] = {

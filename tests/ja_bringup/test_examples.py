@@ -8,8 +8,7 @@ from typer.testing import CliRunner
 
 from ja_bringup.cli import app
 from ja_bringup.examples import EXAMPLES
-from ja_bringup.graph import split_ros_arguments
-from ja_bringup.run import check_ros_arguments
+from ja_common.ros_arguments import check_ros_arguments, split_ros_arguments
 
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 LINES = [(name, line) for name in COMMANDS for line in EXAMPLES.get(name, {})]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from ja_experiments.looks import Looks
+from ja_experiments.datasets.looks import Looks
 from ja_sim.core.specs import ObjectsSpec
 
 

@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from ja_experiments.gym_agent import GymAgent
+from ja_experiments.agents.gym_agent import GymAgent
 from ja_learning.core.gaze_line import GazeLineConfig
 from ja_learning.core.learner import LearnerChoice, make_learner
 from ja_learning.core.network import NetworkConfig

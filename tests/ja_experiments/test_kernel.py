@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from ja_experiments.config import READINGS, reading
-from ja_experiments.kernel import FastExperiment, prepare
-from ja_experiments.looks import Looks
-from ja_experiments.outcomes import Outcomes
-from ja_experiments.reference import ReferenceExperiment
+from ja_experiments.datasets.looks import Looks
+from ja_experiments.paper.kernel import FastExperiment, prepare
+from ja_experiments.paper.outcomes import Outcomes
+from ja_experiments.paper.reference import ReferenceExperiment
 from ja_sim.core.specs import ObjectsSpec
 
 # The gate opens half-way, so that both sources and both kinds of trial end are compared.

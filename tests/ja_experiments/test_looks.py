@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ja_experiments import looks as looks_module
-from ja_experiments.looks import Looks, load_looks
+from ja_experiments.datasets.looks import Looks, load_looks
 
 
 class Renderer:

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import yaml
 
+from ja_common.core.statistics import over_seeds
 from ja_experiments import study as study_module
 from ja_experiments.config import reading
-from ja_experiments.estimate import over_seeds
-from ja_experiments.experiment import BLOCKS, Materials, Plan, run_conditions
-from ja_experiments.looks import Looks
+from ja_experiments.datasets.looks import Looks
+from ja_experiments.paper.experiment import BLOCKS, Materials, Plan, run_conditions
+from ja_experiments.paper.report import write_report
+from ja_experiments.paper.study import StudyConfig, read_ablations, run_study
 from ja_experiments.progress import Progress
-from ja_experiments.report import write_report
-from ja_experiments.study import StudyConfig, read_ablations, run_study
 from ja_sim.core.specs import ObjectsSpec
 
 

@@ -11,8 +11,8 @@ import pytest
 from distributed import LocalCluster
 
 from ja_common.core.config import ConfigError
-from ja_experiments.experiment import Materials
-from ja_experiments.looks import Looks
+from ja_experiments.datasets.looks import Looks
+from ja_experiments.paper.experiment import Materials
 from ja_experiments.progress import Progress
 from ja_experiments.sweep import Grid, read_grid, run_cell, run_sweep
 from ja_sim.core.specs import ObjectsSpec

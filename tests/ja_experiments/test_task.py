@@ -8,10 +8,10 @@ from ja_common.core.detection import Kind, objects
 from ja_common.core.geometry import angle_between
 from ja_common.core.posture import Posture
 from ja_control.core.attention_cycle import Phase, Source
+from ja_experiments.agents.robot import FixedTurn, Robot
 from ja_experiments.config import ExperimentConfig, reading
-from ja_experiments.looks import Looks
-from ja_experiments.robot import FixedTurn, Robot
-from ja_experiments.task import ATTENDED, SimulatedTask
+from ja_experiments.datasets.looks import Looks
+from ja_experiments.paper.task import ATTENDED, SimulatedTask
 from ja_sim.core.specs import ObjectsSpec
 
 

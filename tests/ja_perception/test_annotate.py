@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from ja_common.core.annotate import annotated
+from ja_common.core.camera_model import CameraModel
 from ja_common.core.posture import Posture
-from ja_perception.core.annotate import annotated
 from ja_perception.core.blazeface import BlazeFace
-from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.detector import SalientFeatureDetector
 from synthetic_pictures import draw_ball, draw_face, room
 
@@ -21,7 +21,9 @@ def test_draws_on_a_copy_what_was_found(size):
     posture = Posture(1, np.zeros(2), np.zeros(2))
     percept = SalientFeatureDetector(BlazeFace()).look(picture, 1, camera, posture)
     before = picture.copy()
-    drawn = annotated(picture, percept, camera, d_th_rad=0.1, latency_s=0.0123)
+    drawn = annotated(
+        picture, percept.detections, percept.face_image, camera, d_th_rad=0.1, latency_s=0.0123
+    )
     assert np.array_equal(picture, before)
     scale = drawn.shape[1] // width
     assert drawn.shape == (scale * height, scale * width, 3)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from ja_common.core.camera_model import CameraModel
 from ja_common.core.detection import caregiver_face
 from ja_common.core.fixation import WIDTH_SIXTH
 from ja_common.core.geometry import directions_of_rays
 from ja_perception.core.blazeface import BlazeFace
-from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.detector import SalientFeatureDetector
 from ja_sim.core.digital_head import DigitalHead
 from synthetic_pictures import draw_ball, draw_face, room

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ja_common.core.camera_model import CameraModel
 from ja_common.core.detection import Kind
 from ja_common.core.geometry import directions_of_rays, rays_of_directions
 from ja_common.core.posture import Posture
 from ja_perception.core.blazeface import BlazeFace
-from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.detector import DetectorConfig, SalientFeatureDetector
 from ja_perception.core.salient_objects import InterestConfig
 from ja_sim.core.digital_head import DigitalHead, DigitalHeadConfig

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
+from ja_common.core.camera_model import CameraModel
 from ja_common.core.geometry import directions_of_rays, head_rotation, rays_of_directions
-from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.ego_motion import expected_image, rotation_homography
 from ja_perception.core.undistortion import bent, straightened
 

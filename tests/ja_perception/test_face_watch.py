@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from ja_common.core.camera_model import CameraModel
 from ja_common.core.geometry import rays_of_directions
 from ja_perception.core.box import Box
-from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.face_watch import FaceConfig, FaceWatch, look_at, scan_squares
 from ja_perception.core.faces import Face
 

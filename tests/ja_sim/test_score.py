@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from ja_sim.core.score import Rate, Score, TruthAt
+from ja_common.core.statistics import Rate
+from ja_sim.core.score import Score, TruthAt
 
 LEFT, RIGHT, FAR = (0.3, 0.0), (-0.3, 0.1), (0.8, 0.0)
 DIRECTIONS = np.array([LEFT, RIGHT, FAR])

@@ -20,9 +20,6 @@ setup(
     entry_points={
         'console_scripts': [
             'ja = ja_bringup.cli:main',
-            'player = ja_bringup.player_node:main',
-            'recorder = ja_bringup.recorder_node:main',
-            'view = ja_bringup.view_node:main',
         ],
     },
 )

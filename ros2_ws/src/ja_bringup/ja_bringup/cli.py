@@ -7,23 +7,17 @@ from typing import Annotated
 
 import typer
 
-from ja_bringup.bench import benchmarks
-from ja_bringup.calibration.cli import register as register_calibration
+from ja_benchmarks.run_benchmarks import benchmarks
+from ja_bringup.commands.calibration import register as register_calibration
+from ja_bringup.commands.diagnostics import register as register_inspection
+from ja_bringup.commands.experiments import register as register_experiments
+from ja_bringup.commands.recording import register as register_recording
+from ja_bringup.commands.rig_tools import register as register_rig_tools
 from ja_bringup.examples import show_examples
-from ja_bringup.graph import (
-    RECORDER,
-    rig_graph,
-    sim_graph,
-    split_ros_arguments,
-    swapped,
-    with_arguments,
-)
-from ja_bringup.inspect_cli import register as register_inspection
-from ja_bringup.recording.cli import register as register_recording
-from ja_bringup.rig_cli import register as register_rig_tools
 from ja_common.core.config import ConfigError
+from ja_common.ros_arguments import split_ros_arguments
 from ja_common.ros_defaults import apply_ros_defaults
-from ja_experiments.cli import register as register_experiments
+from ja_runner.graph import RECORDER, rig_graph, sim_graph, swapped, with_arguments
 
 app = typer.Typer(
     help='A camera head that learns joint attention, on ROS 2. ROS arguments go behind '
@@ -141,7 +135,7 @@ def rig(
     on_death: OnDeathOption = OnDeathChoice.stop,
 ) -> None:
     """Run the same graph on real pictures: a digital head in them, or a rig's own motors."""
-    from ja_bringup.run import new_run_folder, run_graph
+    from ja_runner.run import new_run_folder, run_graph
 
     arguments = context.obj or []
     code, _ = run_graph(
@@ -171,7 +165,7 @@ def bench(
     ] = None,
 ) -> None:
     """Measure: a table of figures, each with its unit, count and interval."""
-    from ja_bringup.bench import run_benchmarks
+    from ja_benchmarks.run_benchmarks import run_benchmarks
 
     sys.exit(run_benchmarks(name, json_file))
 

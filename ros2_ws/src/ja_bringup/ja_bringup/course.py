@@ -15,7 +15,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from std_srvs.srv import SetBool
 
-from ja_bringup.progress import ProgressNode
+from ja_runner.progress import ProgressNode
 
 _GATING = ('gating', 'p_lm_max')
 _LEARNER_ALWAYS = ('constant', 1.0)

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ja_bringup.course import Course, Stage
-from ja_bringup.graph import NodeSpec
-from ja_bringup.progress import WINDOW_TRIALS, ProgressNode, rate_text
-from ja_bringup.run import check_memory, new_run_folder, run_graph
-from ja_bringup.supervisor import OnDeath
+from ja_runner.graph import NodeSpec
+from ja_runner.progress import WINDOW_TRIALS, ProgressNode
+from ja_runner.run import check_memory, new_run_folder, run_graph
+from ja_runner.supervisor import OnDeath
 
 
 def run_demo(
@@ -49,7 +49,7 @@ def run_demo(
         print(line)
     if watcher.curve.records:
         # matplotlib only now: before the run it would keep the first node waiting.
-        from ja_bringup.report import draw_png, write_csv
+        from ja_bringup.success_curve import draw_png, write_csv
 
         print(f'success curve: {write_csv(watcher.curve, folder)}')
         print(f'               {draw_png(watcher.curve, folder, WINDOW_TRIALS)}')
@@ -75,7 +75,7 @@ def summary(watcher: ProgressNode, stages: Sequence[Stage]) -> list[str]:
                 f'{stage.name}, last trials': slice(-WINDOW_TRIALS, None),
             }
         lines += [
-            f'success, {name + ":":28} {rate_text(curve.rate(part, stage.name))}'
+            f'success, {name + ":":28} {curve.rate(part, stage.name)}'
             for name, part in parts.items()
         ]
     return [*lines, f'chance, one object of {watcher.objects}: {1 / watcher.objects:.2f}']

@@ -19,13 +19,13 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 
-from ja_bringup.graph import NodeSpec
-from ja_bringup.recording.qos_text import offered_text
-from ja_bringup.recording.recording_folder import Channel, Limits, RecordingFolder
 from ja_bringup.sros_policy import policy_xml
 from ja_common.graph_node import GraphNode
 from ja_common.parameters import UNBOUNDED
+from ja_common.qos_text import offered_text
 from ja_common.topics import CLOCK, TOPICS
+from ja_recording.recording_folder import Channel, Limits, RecordingFolder
+from ja_runner.graph import NodeSpec
 
 NODES = (
     NodeSpec('ja_perception', 'camera'),
@@ -39,9 +39,9 @@ NODES = (
     NodeSpec('ja_sim', 'digital_head'),
 )
 COMPANIONS = (
-    NodeSpec('ja_bringup', 'view'),
-    NodeSpec('ja_bringup', 'recorder'),
-    NodeSpec('ja_bringup', 'player'),
+    NodeSpec('ja_dashboard', 'view'),
+    NodeSpec('ja_recording', 'recorder'),
+    NodeSpec('ja_recording', 'player'),
 )
 """Beside the graph, and no part of it: what they hear and say is whatever there is."""
 

@@ -32,7 +32,7 @@ from distributed import Client, LocalCluster, as_completed
 
 from ja_common.core.config import ConfigError
 from ja_experiments.config import READINGS, ExperimentConfig, reading
-from ja_experiments.experiment import BLOCKS, STAGES, Materials, Plan, run_seed
+from ja_experiments.paper.experiment import BLOCKS, STAGES, Materials, Plan, run_seed
 from ja_experiments.progress import Progress
 
 TABLE_NAME = 'results.parquet'

@@ -8,11 +8,11 @@ from typing import Any
 from rclpy.executors import ExternalShutdownException
 from std_msgs.msg import Header
 
+from ja_common.core.camera_model import CameraModel
 from ja_common.core.config import parameter
 from ja_common.graph_node import GraphNode, spin_node
 from ja_common.image_codec import encode_camera_info, encode_image
 from ja_common.topics import CAMERA_INFO, IMAGE
-from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.frame_sources import SourceError, open_source
 
 

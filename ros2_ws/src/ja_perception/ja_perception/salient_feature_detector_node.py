@@ -14,6 +14,8 @@ from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
+from ja_common.core.annotate import annotated
+from ja_common.core.camera_model import CameraModel
 from ja_common.core.config import parameter
 from ja_common.core.detection import Detection, caregiver_face
 from ja_common.core.health import Level
@@ -34,9 +36,7 @@ from ja_common.topics import (
     JOINT_STATES,
     TARGET,
 )
-from ja_perception.core.annotate import annotated
 from ja_perception.core.blazeface import BlazeFace
-from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.detector import DetectorConfig, Percept, SalientFeatureDetector
 from ja_perception.core.faces import FaceFinder
 from ja_perception.core.haar import HaarFaces
@@ -183,7 +183,7 @@ class SalientFeatureDetectorNode(GraphNode):
         seconds: float,
     ) -> None:
         d_th_rad = self._config.attention.d_th_rad
-        drawn = annotated(image, percept, camera, d_th_rad, seconds)
+        drawn = annotated(image, percept.detections, percept.face_image, camera, d_th_rad, seconds)
         self._says_annotated.publish(encode_image(drawn, header.stamp, header.frame_id))
 
     def _camera(self, image: NDArray[np.uint8]) -> CameraModel:

@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ja_common.core.camera_model import CameraModel
 from ja_common.core.config import parameter
 from ja_common.core.detection import Detection, Kind, most_salient
 from ja_common.core.fixation import WIDTH_SIXTH, stands_in_centre
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_perception.core.box import Box
-from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.face_crop import FACE_COLUMNS, FACE_ROWS, crop_face
 from ja_perception.core.face_watch import FaceConfig, FaceWatch
 from ja_perception.core.faces import FaceFinder

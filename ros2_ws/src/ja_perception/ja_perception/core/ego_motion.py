@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ja_perception.core.camera_model import CameraModel
+from ja_common.core.camera_model import CameraModel
 
 # From the head frame (x forward, y left, z up) to the optical frame (x right, y down, z forward).
 _OPTICAL_FROM_HEAD = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ja_common.core.camera_model import CameraModel
 from ja_common.core.config import parameter
 from ja_common.core.geometry import head_rotation
 from ja_common.core.posture import NS_PER_S, Posture
-from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.ego_motion import expected_image, rotation_homography
 from ja_perception.core.features import FeatureConfig, Mask, motion_map
 from ja_perception.core.undistortion import bent, straightened

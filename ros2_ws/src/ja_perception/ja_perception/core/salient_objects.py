@@ -7,13 +7,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ja_common.core.camera_model import CameraModel
 from ja_common.core.config import parameter
 from ja_common.core.detection import Detection, Kind
 from ja_common.core.fixation import WIDTH_SIXTH
 from ja_common.core.geometry import vectors_of_rays
 from ja_common.core.posture import Posture
 from ja_perception.core.box import Box, corners, scaled
-from ja_perception.core.camera_model import CameraModel
 from ja_perception.core.features import ColourMap, FeatureConfig, Mask, colour_map, edge_map
 from ja_perception.core.grouping import (
     Grouping,

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ja_perception.core.camera_model import CameraModel
+from ja_common.core.camera_model import CameraModel
 
 Maps = tuple[NDArray, NDArray]
 

@@ -3,17 +3,14 @@
 Only here and in the simulator is that known; the robot's own nodes never hear of it.
 """
 
-import math
 from collections import deque
 from dataclasses import dataclass
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ja_common.core.geometry import angle_between
-
-_Z = NormalDist().inv_cdf(0.975)
+from ja_common.core.statistics import Rate
 
 
 @dataclass(frozen=True)
@@ -27,30 +24,6 @@ class Outcome:
     attended: tuple[float, float]
     fixated: tuple[float, float] | None
     success: bool
-
-
-@dataclass(frozen=True)
-class Rate:
-    """A share of successes among trials, with its 95 % interval (Wilson)."""
-
-    successes: int
-    trials: int
-
-    @property
-    def rate(self) -> float:
-        """Successes a trial; NaN before the first."""
-        return self.successes / self.trials if self.trials else float('nan')
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % confidence interval of the rate."""
-        if not self.trials:
-            return (0.0, 1.0)
-        # Written out: scipy.stats, which has it, takes half a second to import.
-        share, n, pull = self.rate, self.trials, _Z**2 / self.trials
-        centre = share + pull / 2
-        half = _Z * math.sqrt(share * (1 - share) / n + pull / (4 * n))
-        return (max(0.0, (centre - half) / (1 + pull)), min(1.0, (centre + half) / (1 + pull)))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,125 @@
+"""How well anybody could do: the success of observers who see her gaze, or her head, exactly."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ja_benchmarks.rows import Row, share_row
+from ja_common.core.geometry import (
+    angle_between,
+    directions_of_vectors,
+    vectors_of_directions,
+)
+from ja_sim.core.gaze import missed
+from ja_sim.core.objects import Arrangement
+from ja_sim.core.scene import Scene, load_scene
+
+# From the base frame to her rest frame, in which x points towards the robot.
+_TO_HER_FRAME = np.array([-1.0, -1.0, 1.0])
+
+
+def ceiling(trials: int = 8000) -> dict[str, Row]:
+    """Success of who sees exactly where her eyes, or her head, point, but not how far it is.
+
+    Her eyes miss what she looks at by a little, as the scene says. Who sees them asks of every
+    object how near it is to the line of gaze, or, as a network with one pair of outputs must,
+    turns the gaze into the most likely direction first. Who sees her head alone asks which object
+    makes its angles most probable: her eyes are too small in the picture to be of much help.
+    """
+    rows: dict[str, Row] = {}
+    for count in (5, 10):
+        scene = load_scene('default')
+        scene = dataclasses.replace(scene, objects=dataclasses.replace(scene.objects, count=count))
+        # She attends to the first of each row; the order of drawing means nothing.
+        positions = _arrangements(scene, trials)
+        directions = directions_of_vectors(positions)
+        looked_at = _looked_at(scene, positions[:, 0])
+        lines = directions_of_vectors(_along_gaze(scene, looked_at))
+        off_line = angle_between(lines[:, None], directions[:, :, None]).min(axis=2)
+        rows[f'ceiling, {count} objects, nearest to the line of gaze'] = share_row(
+            off_line.argmin(axis=1) == 0
+        )
+        rows[f'ceiling, {count} objects, her head alone'] = share_row(
+            _likelihood_of_head(scene, looked_at, directions).argmax(axis=1) == 0
+        )
+        guess = _one_guess(directions_of_vectors(_face(scene) - looked_at), directions[:, 0])
+        off_guess = angle_between(guess[:, None], directions)
+        rows[f'ceiling, {count} objects, nearest to one guess'] = share_row(
+            off_guess.argmin(axis=1) == 0
+        )
+    return rows
+
+
+def _face(scene: Scene) -> np.ndarray:
+    return np.array([scene.caregiver.distance_m, 0.0, 0.0])
+
+
+def _arrangements(scene: Scene, trials: int) -> np.ndarray:
+    """Positions of the objects (T, N, 3) [m] as the world draws them."""
+    arrangement = Arrangement(scene.objects, _face(scene), np.random.default_rng(0))
+    places = []
+    for _ in range(trials):
+        arrangement.rearrange()
+        places.append([thing.position for thing in arrangement.things])
+    return np.array(places)
+
+
+def _looked_at(scene: Scene, attended: np.ndarray) -> np.ndarray:
+    """Where her eyes point (T, 3) [m] when she attends to things at (T, 3) [m]."""
+    rng, deviation = np.random.default_rng(1), np.radians(scene.caregiver.gaze_noise_deg)
+    eyes = np.broadcast_to(_face(scene), (2, 3))
+    return np.array([missed(each, eyes, rng.normal(0.0, deviation, 2)) for each in attended])
+
+
+def _one_guess(gaze: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """Mean direction (T, 2) of what is attended to, given the gaze (T, 2): a cubic fit."""
+    yaw, pitch = gaze.T
+    powers = [yaw**i * pitch**j for i in range(4) for j in range(4 - i)]
+    features = np.stack(powers, axis=1)
+    return features @ np.linalg.lstsq(features, directions, rcond=None)[0]
+
+
+def _along_gaze(scene: Scene, attended: np.ndarray, steps: int = 60) -> np.ndarray:
+    """Points (T, steps, 3) [m] of each line of gaze at which the scene allows an object.
+
+    The ends are where the line leaves the shell of allowed distances from the robot.
+    """
+    face = _face(scene)
+    along = attended - face
+    along = along / np.linalg.norm(along, axis=1, keepdims=True)
+    depth = np.linspace(0.0, 2.0 * scene.caregiver.distance_m, 400)[None, :, None]
+    points = face + depth * along[:, None]
+    low, high = scene.objects.distance_m
+    distance = np.linalg.norm(points, axis=2)
+    lines = []
+    for line, allowed in zip(points, (distance > low) & (distance < high), strict=True):
+        first = np.argmax(allowed)  # the near side only: beyond it she would look past the robot
+        last = first + np.argmin(np.append(allowed[first:], False))
+        lines.append(line[np.linspace(first, last - 1, steps).round().astype(int)])
+    return np.array(lines)
+
+
+def _likelihood_of_head(
+    scene: Scene, looked_at: np.ndarray, directions: np.ndarray, steps: int = 17
+) -> np.ndarray:
+    """How probable each object at directions (T, N, 2) makes her head's angles, (T, N).
+
+    How far away an object is, and what share of the gaze her head takes, are not known: all that
+    the scene allows is equally likely.
+    """
+    spec, face = scene.caregiver, _face(scene)
+    rng = np.random.default_rng(2)
+    taken = rng.uniform(*spec.head_share, len(looked_at))
+    error = rng.normal(0.0, np.radians(spec.head_noise_deg), (len(looked_at), 2))
+    head = taken[:, None] * directions_of_vectors((looked_at - face) * _TO_HER_FRAME) + error
+    likelihood = np.zeros(directions.shape[:2])
+    for distance in np.linspace(*scene.objects.distance_m, steps):
+        places = distance * vectors_of_directions(directions)
+        gaze = directions_of_vectors((places - face) * _TO_HER_FRAME)
+        for share in np.linspace(*spec.head_share, steps):
+            deviation = np.radians(np.hypot(spec.head_noise_deg, share * spec.gaze_noise_deg))
+            off = (head[:, None] - share * gaze) / deviation
+            likelihood += np.exp(-0.5 * (off**2).sum(axis=-1)) / deviation**2
+    return likelihood

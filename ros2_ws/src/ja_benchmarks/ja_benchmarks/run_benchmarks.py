@@ -1,0 +1,60 @@
+"""The one door to every benchmark: `./ja bench [NAME] [--json FILE]`.
+
+A benchmark is a module in the folder below, with `run() -> {figure: row}`; its name is the
+module's. A row is `{'value', 'unit', 'n', 'interval'}`: n samples, and the 95 % interval of the
+value ([low, high], or None where it has no meaning).
+"""
+
+import importlib
+import json
+import pkgutil
+from collections.abc import Mapping
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from ja_benchmarks.rows import Row
+from ja_common.core.config import ConfigError
+
+FOLDER = 'ja_benchmarks.benchmarks'
+
+
+def benchmarks() -> dict[str, str]:
+    """Names and modules of all benchmarks that are installed."""
+    package = importlib.import_module(FOLDER)
+    names = sorted(module.name for module in pkgutil.iter_modules(package.__path__))
+    return {name: f'{FOLDER}.{name}' for name in names}
+
+
+def run_benchmarks(name: str | None, json_file: Path | None) -> int:
+    """Run one or all: tables on the terminal, figures to `json_file`; the exit code.
+
+    Raises ConfigError for an unknown name, or for a file that cannot be written.
+    """
+    known = benchmarks()
+    if name is not None and name not in known:
+        raise ConfigError(f'no benchmark {name!r}; there are: {", ".join(known)}')
+    if json_file is not None and not json_file.absolute().parent.is_dir():
+        raise ConfigError(f'{json_file}: there is no folder {json_file.absolute().parent}')
+    figures: dict[str, Row] = {}
+    for each in [name] if name else known:
+        with Console(stderr=True).status(f'bench {each} ...'):
+            rows = importlib.import_module(known[each]).run()
+        Console().print(table_of(each, rows))
+        figures |= {f'{each}/{figure}': row for figure, row in rows.items()}
+        if json_file is not None:  # after each: an interrupted run keeps what it has
+            json_file.write_text(json.dumps(figures, indent=2) + '\n')
+    return 0
+
+
+def table_of(name: str, rows: Mapping[str, Row]) -> Table:
+    """The figures of one benchmark, for people."""
+    table = Table(title=f'bench {name}', title_justify='left')
+    for column in ('figure', 'value', '95 % interval', 'unit', 'n'):
+        table.add_column(column, justify='left' if column in ('figure', 'unit') else 'right')
+    for figure, row in rows.items():
+        interval = row['interval']
+        between = '' if interval is None else f'{interval[0]:.4g} - {interval[1]:.4g}'
+        table.add_row(figure, f'{row["value"]:.4g}', between, row['unit'], str(row['n']))
+    return table

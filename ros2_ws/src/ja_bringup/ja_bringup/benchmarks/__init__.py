@@ -1,1 +1,0 @@
-"""Benchmarks of the whole graph; what a benchmark is: `ja_bringup.bench`."""

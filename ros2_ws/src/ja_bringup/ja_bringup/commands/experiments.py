@@ -1,0 +1,79 @@
+"""The commands `figures` and `sweep`, for `./ja`."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+_CORES = os.cpu_count() or 1
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to an app."""
+    app.command()(figures)
+    app.command()(sweep)
+
+
+def figures(
+    trials: Annotated[
+        int, typer.Option(min=3000, help='Trials a run; the gate keeps its place.')
+    ] = 300_000,
+    seeds: Annotated[int, typer.Option(min=1, help='Runs of every condition.')] = 10,
+    ablations: Annotated[int, typer.Option(min=0, help='Seeds of the ablations; 0: none.')] = 0,
+    scene: Annotated[str, typer.Option(help='Scene of the sim, by name or file.')] = 'default',
+    looks_seed: Annotated[int, typer.Option(min=0, help='Seed of the caregiver looked at.')] = 0,
+    data: Annotated[
+        Path | None,
+        typer.Option(help='Folder of `./ja export`: recorded looks in place of rendered ones.'),
+    ] = None,
+    pool: Annotated[
+        int,
+        typer.Option(min=0, help='Recorded looks to learn from; 0: 125, or four fifths of them.'),
+    ] = 0,
+    workers: Annotated[int, typer.Option(min=1, help='Cores to use.')] = _CORES,
+    output: Annotated[Path | None, typer.Option(help='Folder of the report.')] = None,
+) -> None:
+    """Reproduce Figures 6 and 7 of the paper, without ROS, and write a report."""
+    from ja_experiments.paper.experiment import Plan
+    from ja_experiments.paper.report import write_report
+    from ja_experiments.paper.study import StudyConfig, run_study
+    from ja_experiments.progress import Progress
+
+    config = StudyConfig(
+        plan=Plan(trials=trials, seeds=tuple(range(seeds))),
+        scene=scene,
+        looks_seed=looks_seed,
+        data=str(data or ''),
+        pool=pool,
+        ablation_seeds=min(ablations, seeds),
+        workers=workers,
+    )
+    study = run_study(config, Progress())
+    folder = output or Path('runs') / f'{time.strftime("%Y%m%d-%H%M%S")}-figures'
+    typer.echo(f'The report: {write_report(study, folder)}')
+
+
+def sweep(
+    config: Annotated[Path, typer.Argument(help='The grid, as YAML.')],
+    scheduler: Annotated[
+        str | None, typer.Option(help='Address of a Dask scheduler; without it, local processes.')
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help='Local processes.')] = _CORES,
+    output: Annotated[
+        Path | None, typer.Option(help='Folder of the results; one with results goes on.')
+    ] = None,
+) -> None:
+    """Run a grid of experiments over seeds and parameters; what is finished is kept."""
+    from ja_experiments.paper.study import prepare_materials
+    from ja_experiments.progress import Progress
+    from ja_experiments.sweep import read_grid, run_sweep
+
+    grid, progress = read_grid(config), Progress()
+    materials = prepare_materials(grid.scene, looks_seed=0, progress=progress)
+    folder = output or Path('runs') / f'sweep-{config.stem}'
+    table = run_sweep(grid, materials, folder, progress, scheduler, workers)
+    typer.echo(f'The results: {table}')

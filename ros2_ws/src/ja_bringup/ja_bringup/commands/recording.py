@@ -1,0 +1,93 @@
+"""The commands `record`, `replay` and `export`, for `./ja`."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to an app."""
+    app.command()(record)
+    app.command()(replay)
+    app.command()(export)
+
+
+def record(
+    context: typer.Context,
+    output: Annotated[
+        Path | None, typer.Option(help='Folder of the recording; runs/<time>-record without it.')
+    ] = None,
+    exclude: Annotated[
+        str, typer.Option(help='Regular expression: topics that it matches are left out.')
+    ] = 'image_annotated',
+    time_s: Annotated[
+        float, typer.Option('--time', min=0.0, help='End after so many seconds; 0: no end.')
+    ] = 0.0,
+    keep_mb: Annotated[
+        float, typer.Option(min=0.0, help='Drop the oldest files beyond so many MB; 0: keep all.')
+    ] = 4000.0,
+    keep_s: Annotated[
+        float, typer.Option(min=0.0, help='Drop files older than so many seconds; 0: keep all.')
+    ] = 0.0,
+) -> None:
+    """Record every topic of the running graph, whatever its type, as MCAP."""
+    from ja_bringup.record_and_replay import record as run
+
+    parameters = {
+        'folder': '' if output is None else str(output),
+        'exclude': exclude,
+        'keep_mb': keep_mb,
+        'keep_s': keep_s,
+    }
+    sys.exit(run(parameters, time_s, context.obj or []))
+
+
+def replay(
+    context: typer.Context,
+    recording: Annotated[Path, typer.Argument(help='A .mcap file, or a folder of them.')],
+    speed: Annotated[
+        float, typer.Option(min=0.001, max=1000.0, help='Recorded seconds a second.')
+    ] = 1.0,
+    without: Annotated[
+        list[str] | None, typer.Option(help='A topic to leave out; may be given several times.')
+    ] = None,
+    score: Annotated[
+        bool, typer.Option('--score', help='Publish nothing: teach a learner, print its curve.')
+    ] = False,
+    csv_file: Annotated[
+        Path | None, typer.Option('--csv', help='With --score: one row a trial into this file.')
+    ] = None,
+    as_json: Annotated[bool, typer.Option('--json', help='With --score: print JSON.')] = False,
+) -> None:
+    """Publish a recording again, with /clock, for a node to be tried on it."""
+    from ja_bringup.record_and_replay import replay as run
+
+    if score:
+        from ja_bringup.recorded_trials import score as run_score
+
+        sys.exit(run_score(recording, csv_file, as_json, context.obj or []))
+
+    parameters = {
+        'recording': str(recording),
+        'speed': speed,
+        'without': ','.join(without or ()),
+    }
+    sys.exit(run(parameters, context.obj or []))
+
+
+def export(
+    context: typer.Context,
+    recordings: Annotated[
+        list[Path], typer.Argument(help='Recordings: .mcap files, or folders of them.')
+    ],
+    to: Annotated[Path, typer.Option('--to', help='Folder of the data set, which is made.')],
+    licence: Annotated[
+        str, typer.Option(help='What its card says about who may use it, and how.')
+    ] = '',
+) -> None:
+    """Turn recordings into a data set of trials: a Parquet table, PNG faces, and a card."""
+    from ja_bringup.recorded_trials import export as run
+
+    sys.exit(run(recordings, to, licence, context.obj or []))

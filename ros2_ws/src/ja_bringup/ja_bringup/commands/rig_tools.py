@@ -1,0 +1,86 @@
+"""The commands that try a rig before it is trusted, for `./ja`."""
+
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to an app."""
+    app.command()(faults)
+    app.command()(soak)
+
+
+def faults(
+    only: Annotated[
+        str, typer.Option(help='Only faults with this in their name: killed, clock, network, ...')
+    ] = '',
+) -> None:
+    """Do every fault to a simulated rig: kill, freeze, cut, delay; a table of what the head does.
+
+    Exit code 1 when the head did not stop or go on as it has to, or when something was forgotten.
+    """
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from ja_diagnostics.faults.hosts import CASES, missing, run_on_hosts
+    from ja_diagnostics.faults.run import COLUMNS, FaultRun, Outcome
+
+    outcomes: list[Outcome] = []
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        run = FaultRun(folder / 'here', typer.echo)
+        if chosen := [fault for fault in run.faults() if only in fault.name]:
+            run.run(chosen)
+            outcomes += run.outcomes
+        if cases := [case for case in CASES if only in case]:
+            if why := missing():
+                typer.echo(f'left out: {", ".join(cases)}: {why}')
+            else:
+                outcomes += [run_on_hosts(case, folder / case, typer.echo) for case in cases]
+    table = Table(*COLUMNS, box=box.MARKDOWN)
+    for outcome in outcomes:
+        table.add_row(*outcome.row())
+    typer.echo()
+    Console(width=130, soft_wrap=True).print(table)
+    sys.exit(int(not outcomes or not all(outcome.well for outcome in outcomes)))
+
+
+def soak(
+    context: typer.Context,
+    time_s: Annotated[
+        float, typer.Option('--time', min=60.0, help='Run for so many seconds; hours are meant.')
+    ] = 3600.0,
+    camera_rate_hz: Annotated[
+        float, typer.Option(min=1.0, max=240.0, help='Images a second of the simulated camera.')
+    ] = 15.0,
+) -> None:
+    """Run the whole graph in real time for long; a table of what grows, slows down, or is lost."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from ja_common.ros_arguments import parameter_arguments
+    from ja_diagnostics.soak import COLUMNS, Soak
+    from ja_runner.graph import sim_graph, with_arguments
+    from ja_runner.run import new_run_folder
+
+    folder = new_run_folder('soak').absolute()
+    settings = {
+        'lockstep': False,
+        'camera_rate_hz': camera_rate_hz,
+        'checkpoint_folder': str(folder / 'checkpoints'),
+        'trials_file': str(folder / 'trials'),
+    }
+    arguments = [*parameter_arguments(settings), *(context.obj or [])]
+    run = Soak(with_arguments(sim_graph(), arguments), folder, typer.echo)
+    code = run.run(time_s)
+    table = Table(*COLUMNS, box=box.MARKDOWN)
+    for series in run.series():
+        table.add_row(*series.row())
+    Console(width=130, soft_wrap=True).print(table)
+    sys.exit(code)

@@ -1,1 +1,0 @@
-"""What bringup computes without ROS."""

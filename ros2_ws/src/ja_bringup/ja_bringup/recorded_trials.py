@@ -1,0 +1,87 @@
+"""What `./ja replay --score` and `./ja export` do with the trials of recordings."""
+
+import json
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from statistics import median
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from ja_common.ros_arguments import check_ros_arguments
+from ja_recording.core.dataset import Sample, write_dataset
+from ja_recording.core.reader import Recording, warn_of_unfinished
+from ja_recording.learner_score import score_learner, success_rate, write_csv
+from ja_recording.trials import RecordedTrial, recorded_trials
+
+_BLOCK_TRIALS = 50
+
+
+def score(path: Path, csv_file: Path | None, as_json: bool, arguments: Sequence[str]) -> int:
+    """Teach a learner the trials of a recording, and print its curve; the exit code."""
+    check_ros_arguments(arguments)
+    recording = Recording(path)
+    warn_of_unfinished(recording)
+    with _bar(recording, path.name) as advance:
+        trials = score_learner(recording, arguments, advance)
+    if csv_file is not None:
+        write_csv(trials, csv_file)
+    if as_json:
+        print(json.dumps([asdict(trial) for trial in trials]))
+        return 0
+    if not trials:
+        print('no trial of the recording ended in a fixation')
+        return 0
+    blocks = Table(title='learner over recorded trials', title_justify='left')
+    for name in ('trials', 'off, median [deg]', 'learner succeeds', 'recorded success'):
+        blocks.add_column(name)
+    for first in range(0, len(trials), _BLOCK_TRIALS):
+        block = trials[first : first + _BLOCK_TRIALS]
+        off_deg = math.degrees(median(trial.off_rad for trial in block))
+        rates = [str(success_rate(block, of)) for of in ('success', 'recorded')]
+        blocks.add_row(f'{first + 1} - {first + len(block)}', f'{off_deg:.1f}', *rates)
+    Console().print(blocks)
+    return 0
+
+
+def export(paths: Sequence[Path], folder: Path, licence: str, arguments: Sequence[str]) -> int:
+    """Turn recordings into one data set of trials; the exit code."""
+    check_ros_arguments(arguments)
+    recordings = {path: Recording(path) for path in paths}
+
+    def samples() -> Iterator[Sample]:
+        for path, recording in recordings.items():
+            warn_of_unfinished(recording)
+            with _bar(recording, path.name) as advance:
+                for trial in recorded_trials(recording, arguments, advance):
+                    yield sample_of(trial, path.resolve().name)
+
+    card = write_dataset(folder, samples(), arguments, licence)
+    print(f'the data set, and what is in it: {card}')
+    return 0
+
+
+def sample_of(trial: RecordedTrial, recording: str) -> Sample:
+    """A recorded trial as a row of a data set."""
+    return Sample(
+        trial.lesson,
+        recording,
+        trial.look_ns,
+        trial.fixation_ns,
+        trial.source,
+        trial.meant,
+        trial.is_joint_attention(trial.lesson.led_to),
+    )
+
+
+@contextmanager
+def _bar(recording: Recording, name: str) -> Iterator[Callable[[int], None]]:
+    """How far a recording has been read; gives what is told the time of each message."""
+    columns = (TextColumn('{task.description}'), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(name, total=recording.last_ns - recording.first_ns)
+        yield lambda stamp_ns: progress.update(task, completed=stamp_ns - recording.first_ns)

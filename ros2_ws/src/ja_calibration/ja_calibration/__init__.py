@@ -1,0 +1,1 @@
+"""Calibration of a pan-tilt rig: optics, signs, backlash, delay."""

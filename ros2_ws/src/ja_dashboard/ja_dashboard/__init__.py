@@ -1,0 +1,1 @@
+"""The live page: what the head sees and does, in a browser."""

@@ -1,0 +1,250 @@
+"""What the live page shows, gathered from what the graph says: no ROS and no web in here."""
+
+import math
+from collections import Counter, deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ja_common.core.detection import Detection
+from ja_common.core.health import Level
+from ja_common.core.learning_curve import LearningCurve
+
+WINDOW_TRIALS = 100
+STOPPED_AFTER_S = 2.0
+"""Without a new image for so long [s] the graph counts as stopped."""
+_SILENT_AFTER_S = 3.0  # every node reports its health at 1 Hz
+_LOG_LINES = 200
+_CURVE_POINTS = 200
+_DOING = {
+    ('look', ''): 'turning back to where the caregiver was',
+    ('look', 'face'): 'looking at the caregiver',
+    ('shift', 'VF'): 'turning to what stands out (visual feedback)',
+    ('shift', 'LM'): 'turning to where it believes she looks (learning module)',
+    ('search', ''): 'searching for the caregiver',
+    ('home', ''): 'turning home',
+}
+"""In words, by the phase and the source that the gate tells."""
+_CURVE_EVERY_S = 1.0
+
+
+class Run(Enum):
+    """What the graph as a whole is doing."""
+
+    WAITING = 'waiting'
+    RUNNING = 'running'
+    PAUSED = 'paused'
+    HELD = 'head held'
+    STOPPED = 'stopped'
+
+
+@dataclass(frozen=True)
+class State:
+    """What the graph is doing, and why in one sentence."""
+
+    run: Run
+    text: str
+
+    @property
+    def is_live(self) -> bool:
+        """Is the picture of now?"""
+        return self.run in (Run.RUNNING, Run.HELD)
+
+
+@dataclass(frozen=True)
+class Light:
+    """One node's health as last reported; `values` are its figures."""
+
+    node: str
+    level: Level
+    message: str
+    heard_s: float
+    values: Mapping[str, str]
+
+    def now(self, now_s: float) -> 'Light':
+        """The light at a time: STALE when the node has fallen silent."""
+        silent_s = now_s - self.heard_s
+        if silent_s < _SILENT_AFTER_S:
+            return self
+        return Light(
+            self.node, Level.STALE, f'silent for {silent_s:.0f} s', self.heard_s, self.values
+        )
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Where the objects of the sim are, (n, 3) [m] and (n, 2) [rad]; which one she means."""
+
+    positions: NDArray[np.float64]
+    directions: NDArray[np.float64]
+    attended: int
+
+
+@dataclass(frozen=True)
+class Glance:
+    """What the robot sees and does at one image; postures and directions are (pan, tilt) [rad].
+
+    `half_view` is half the field of view [rad], sideways and upward; `low` and `high` are the
+    limits of the joints, `detections` stand at `directions` (n, 2). `belief` (m, 3) holds samples
+    of the learner's belief: direction and weight. `truth` is there on request, in simulation.
+    """
+
+    half_view: tuple[float, float]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    posture: NDArray[np.float64] | None = None
+    command: NDArray[np.float64] | None = None
+    detections: Sequence[Detection] = ()
+    directions: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
+    belief: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
+    truth: Truth | None = None
+
+
+@dataclass(frozen=True)
+class CurvePoints:
+    """Success over trials as five equally long lists: a rate, its 95 % interval, and p(LM)."""
+
+    trials: list[int] = field(default_factory=list)
+    rate: list[float] = field(default_factory=list)
+    low: list[float] = field(default_factory=list)
+    high: list[float] = field(default_factory=list)
+    p_lm: list[float] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, curve: LearningCurve) -> 'CurvePoints':
+        """Some of the trials, the last one among them: as many as a screen can show."""
+        count = len(curve.records)
+        chosen = np.arange(count)[:: -max(1, -(-count // _CURVE_POINTS))][::-1]
+        rates = curve.recent_rates(WINDOW_TRIALS)[chosen]
+        low, high = _wilson(rates, np.minimum(chosen + 1, WINDOW_TRIALS))
+        p_lm = np.array([curve.records[i].p_lm for i in chosen])
+        return cls(
+            (chosen + 1).tolist(),
+            *(np.round(values, 4).tolist() for values in (rates, low, high, p_lm)),
+        )
+
+
+class ViewModel:
+    """Trials, lights, log and state of the graph; times in seconds, monotonic."""
+
+    def __init__(self, now_s: float) -> None:
+        self.curve = LearningCurve()
+        self.gate: Mapping[str, str] = {}
+        self.fixations: Counter[str] = Counter()
+        self.log: deque[tuple[int, str]] = deque(maxlen=_LOG_LINES)
+        self.log_lines = 0
+        self._lights: dict[str, Light] = {}
+        self._began_s = now_s
+        self._stamp_ns: int | None = None
+        self._new_image_s = now_s
+        self._any_image_s = now_s
+        self._fixated = False
+        self._points = CurvePoints()
+        self._drawn_s = -math.inf
+
+    def watch(self, now_s: float) -> None:
+        """Somebody begins to look: silence is counted from here."""
+        self._new_image_s = now_s
+
+    def hear_image(self, stamp_ns: int, now_s: float) -> None:
+        """An image has come, perhaps the last one again."""
+        self._any_image_s = now_s
+        if stamp_ns != self._stamp_ns:
+            self._stamp_ns, self._new_image_s = stamp_ns, now_s
+
+    def hear_fixation(self) -> None:
+        """An object stands in the centre; the gate's status tells whose shift brought it there."""
+        self._fixated = True
+
+    def hear_gate(self, values: Mapping[str, str]) -> None:
+        """The gate's status: it leaves the phase of shifts when a trial ends."""
+        if self.gate.get('phase') == 'shift' and values.get('phase') != 'shift':
+            self.fixations[self.gate.get('source', 'none') if self._fixated else 'none'] += 1
+            self._fixated = False
+        # The source is said with decisions alone, and stands until the next one.
+        self.gate = {**{key: self.gate.get(key, '-') for key in ('source', 'p_lm')}, **values}
+
+    def hear_score(self, success: bool, now_s: float) -> None:
+        """A trial was scored."""
+        p_lm = self.gate.get('p_lm', '-')
+        known = float('nan') if p_lm == '-' else float(p_lm)
+        self.curve.add(success, known, now_s - self._began_s)
+
+    def hear_health(self, light: Light) -> None:
+        """A node's report."""
+        self._lights[light.node] = light
+
+    def hear_log(self, line: str) -> None:
+        """A line that somebody has logged, or an answer to one who pressed a button."""
+        self.log_lines += 1
+        self.log.append((self.log_lines, line))
+
+    def lights(self, now_s: float) -> list[Light]:
+        """All nodes ever heard of, in the order of their names."""
+        return [self._lights[name].now(now_s) for name in sorted(self._lights)]
+
+    def state(self, now_s: float) -> State:
+        """What the graph is doing; a graph that stands still is never called running."""
+        silent_s = now_s - self._new_image_s
+        if silent_s < STOPPED_AFTER_S and self._stamp_ns is not None:
+            if reason := self.gate.get('reason'):
+                return State(Run.HELD, f'the gate holds the head: {reason}')
+            return State(Run.RUNNING, self._doing())
+        if self._stamp_ns is None and silent_s < STOPPED_AFTER_S:
+            return State(Run.WAITING, 'waiting for the first image')
+        repeated = now_s - self._any_image_s < STOPPED_AFTER_S
+        if repeated and self._says('paused') == 'True':
+            return State(Run.PAUSED, 'the simulation is paused')
+        return State(Run.STOPPED, f'no new image for {silent_s:.0f} s')
+
+    def _doing(self) -> str:
+        phase, source = self.gate.get('phase', ''), self.gate.get('source', '')
+        return _DOING.get((phase, source)) or _DOING.get((phase, ''), '')
+
+    def switches(self) -> dict[str, bool]:
+        """What is known to be on or off, by the service that switches it."""
+        said = {'enable': self.gate.get('enabled', ''), 'sim/pause': self._says('paused')}
+        return {service: text == 'True' for service, text in said.items() if text}
+
+    def facts(self) -> dict[str, str]:
+        """What to read, in this order; what is not known is left out."""
+        facts = {
+            'phase': self.gate.get('phase', '-'),
+            'source': self.gate.get('source', '-'),
+            'p(LM)': self.gate.get('p_lm', '-'),
+            'trials': self.gate.get('trials', '-'),
+            'objects': self._says('objects'),
+        }
+        recent = self.curve.rate(slice(-WINDOW_TRIALS, None))
+        if recent.trials:
+            low, high = recent.interval
+            facts[f'success, last {recent.trials}'] = f'{recent.rate:.2f} [{low:.2f}, {high:.2f}]'
+        trials = sum(self.fixations.values())
+        for source, count in sorted(self.fixations.items()):
+            name = 'given up' if source == 'none' else f'fixated by {source}'
+            facts[name] = f'{count / trials:.0%} of {trials}'
+        return {name: text for name, text in facts.items() if text}
+
+    def curve_points(self, now_s: float) -> CurvePoints:
+        """The success curve, drawn anew once a second; the same object while nothing is new."""
+        news = self.curve.records and self._points.trials[-1:] != [len(self.curve.records)]
+        if news and now_s - self._drawn_s >= _CURVE_EVERY_S:
+            self._points, self._drawn_s = CurvePoints.of(self.curve), now_s
+        return self._points
+
+    def _says(self, key: str) -> str:
+        return next((o.values[key] for o in self._lights.values() if key in o.values), '')
+
+
+def _wilson(
+    rates: NDArray[np.float64], trials: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Wilson's 95 % interval of rates over so many trials each."""
+    z = 1.959964
+    centre = rates + z * z / (2 * trials)
+    half = z * np.sqrt(rates * (1 - rates) / trials + (z / (2 * trials)) ** 2)
+    whole = 1 + z * z / trials
+    return (centre - half) / whole, (centre + half) / whole

@@ -1,0 +1,207 @@
+"""What the robot sees and does image by image, heard while somebody looks and at our own pace."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.node import Node
+from sensor_msgs.msg import CameraInfo, JointState, PointCloud2
+
+from ja_common.core.annotate import annotated
+from ja_common.core.camera_model import CameraModel
+from ja_common.core.detection import Detection
+from ja_common.core.fixation import WIDTH_SIXTH
+from ja_common.core.geometry import directions_of_rays
+from ja_common.core.posture import PostureHistory
+from ja_common.detection_codec import decode_detections
+from ja_common.image_codec import decode_image
+from ja_common.joint_codec import JointCodec
+from ja_common.point_cloud_codec import decode_columns
+from ja_common.polled_subscription import Mailbox
+from ja_common.time_codec import to_ns
+from ja_common.topics import (
+    BELIEF,
+    CAMERA_INFO,
+    DETECTIONS,
+    FACE_IMAGE,
+    FIXATION,
+    IMAGE,
+    JOINT_COMMANDS,
+    JOINT_STATES,
+    LM_DELTA,
+    SIM_TRUTH,
+    VF_DELTA,
+    Topic,
+)
+from ja_dashboard.core.view_model import Glance, Truth, ViewModel
+
+ALL_OF_ONE_LOOK = 50
+"""So many messages may wait from look to look: all of 500 images a second, ten looks a second."""
+_DEPTHS = {
+    **dict.fromkeys((IMAGE, CAMERA_INFO, BELIEF), 1),
+    **dict.fromkeys(
+        (JOINT_STATES, DETECTIONS, FACE_IMAGE, VF_DELTA, LM_DELTA, JOINT_COMMANDS), ALL_OF_ONE_LOOK
+    ),
+}
+_STEPS = (DETECTIONS, VF_DELTA, LM_DELTA, FIXATION, JOINT_COMMANDS)
+"""What follows from an image, in the order in which it is said."""
+_ASSUMED_VIEW_RAD = math.radians(36)
+_JPEG_QUALITY = 80
+LIMITS = ('pan_min_rad', 'tilt_min_rad', 'pan_max_rad', 'tilt_max_rad')
+"""The gate's parameters, in the order of (low, high)."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One image (H, W, 3) RGB with what was found in it."""
+
+    stamp_ns: int
+    image: NDArray[np.uint8]
+    detections: list[Detection]
+    face_image: NDArray[np.uint8] | None
+    camera: CameraModel
+    latency_s: float
+
+    def jpeg(self) -> bytes:
+        """With boxes, centre circle and face crop drawn in."""
+        drawn = annotated(
+            self.image, self.detections, self.face_image, self.camera, WIDTH_SIXTH, self.latency_s
+        )
+        quality = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
+        return cv2.imencode('.jpg', cv2.cvtColor(drawn, cv2.COLOR_RGB2BGR), quality)[1].tobytes()
+
+
+class Sight:
+    """Everything that comes once an image; exists only while somebody looks."""
+
+    def __init__(self, node: Node, model: ViewModel, joints: JointCodec) -> None:
+        self._node = node
+        self._model = model
+        self._joints = joints
+        self.boxes = {topic: Mailbox(node, topic, depth) for topic, depth in _DEPTHS.items()}
+        self._postures = PostureHistory()
+        self._pending: tuple[int, Any] | None = None
+        self._sent_ns: dict[int, int] = {}
+        self._calibration: CameraInfo | None = None
+        self.limits = np.radians([[-60.0, -35.0], [60.0, 35.0]])
+        self.picture: Picture | None = None
+        self.glance: Glance | None = None
+        self.latencies_ms: dict[str, float] = {}
+
+    def close(self) -> None:
+        """Stop listening."""
+        for box in self.boxes.values():
+            box.close()
+        self.boxes.clear()
+
+    def show_truth(self, shown: bool) -> None:
+        """Hear the truth of the simulation, or not: unasked, none but the scorer hears it."""
+        if shown and SIM_TRUTH not in self.boxes:
+            self.boxes[SIM_TRUTH] = Mailbox(self._node, SIM_TRUTH, 1)
+        elif not shown and SIM_TRUTH in self.boxes:
+            self.boxes.pop(SIM_TRUTH).close()
+
+    def look(self, now_s: float, fixations: list[tuple[JointState, int]]) -> None:
+        """Take what has come, and the fixations that were heard anyhow.
+
+        An image is shown once the detections on it are here.
+        """
+        taken = {topic: box.take() for topic, box in self.boxes.items()} | {FIXATION: fixations}
+        for message, _ in taken[CAMERA_INFO]:
+            self._calibration = message
+        for message, _ in taken[JOINT_STATES]:
+            if (posture := self._joints.decode_posture(message)) is not None:
+                self._postures.add(to_ns(message.header.stamp), posture)
+        self._time(taken)
+        found = {to_ns(message.header.stamp): message for message, _ in taken[DETECTIONS]}
+        faces = {to_ns(message.header.stamp): message for message, _ in taken[FACE_IMAGE]}
+        if self._pending is not None and self._pending[0] in found:
+            self._show(*self._pending, found, faces, taken)
+        for message, _ in taken[IMAGE]:
+            stamp_ns = to_ns(message.header.stamp)
+            self._model.hear_image(stamp_ns, now_s)
+            self._pending = (stamp_ns, message)
+            if stamp_ns in found:
+                self._show(stamp_ns, message, found, faces, taken)
+
+    def _time(self, taken: Mapping[Topic, list[tuple[Any, int]]]) -> None:
+        """How long after an image each node has said what follows from it."""
+        for message, sent_ns in taken[IMAGE]:
+            self._sent_ns[to_ns(message.header.stamp)] = sent_ns
+        while len(self._sent_ns) > 3:
+            self._sent_ns.pop(next(iter(self._sent_ns)))
+        for topic in _STEPS:
+            for message, sent_ns in taken[topic]:
+                began_ns = self._sent_ns.get(to_ns(message.header.stamp))
+                if began_ns is not None:
+                    self.latencies_ms[topic.name] = (sent_ns - began_ns) / 1e6
+
+    def _show(
+        self,
+        stamp_ns: int,
+        message: Any,
+        found: Mapping[int, PointCloud2],
+        faces: Mapping[int, Any],
+        taken: Mapping[Topic, list[tuple[Any, int]]],
+    ) -> None:
+        self._pending = None
+        image = decode_image(message)
+        detections = decode_detections(found[stamp_ns])
+        face = decode_image(faces[stamp_ns])[..., 0] if stamp_ns in faces else None
+        camera = self._camera(image)
+        latency_s = self.latencies_ms.get(DETECTIONS.name, 0.0) / 1e3
+        self.picture = Picture(stamp_ns, image, detections, face, camera, latency_s)
+        sample = self._postures.at(stamp_ns) or self._postures.newest
+        posture = None if sample is None else sample.position
+        rays = np.array([detection.ray for detection in detections]).reshape(-1, 2)
+        self.glance = Glance(
+            half_view=(
+                math.atan(camera.width / 2 / camera.fx), math.atan(camera.height / 2 / camera.fy)
+            ),
+            low=self.limits[0],
+            high=self.limits[1],
+            posture=posture,
+            command=self._newest_command(taken[JOINT_COMMANDS]),
+            detections=detections if posture is not None else [],
+            directions=np.zeros((0, 2)) if posture is None else directions_of_rays(posture, rays),
+            belief=self._belief(taken[BELIEF]),
+            truth=self._truth(taken.get(SIM_TRUTH, [])),
+        )  # fmt: skip
+
+    def _newest_command(self, taken: list[tuple[JointState, int]]) -> NDArray[np.float64] | None:
+        if taken:
+            return self._joints.decode_posture(taken[-1][0])
+        return self.glance.command if self.glance else None
+
+    def _belief(self, taken: list[tuple[PointCloud2, int]]) -> NDArray[np.float64]:
+        if taken:
+            columns = decode_columns(taken[-1][0], ('pan', 'tilt', 'weight'))
+            return np.column_stack(list(columns.values())).astype(float)
+        return self.glance.belief if self.glance else np.zeros((0, 3))
+
+    def _truth(self, taken: list[tuple[PointCloud2, int]]) -> Truth | None:
+        if taken:
+            c = decode_columns(taken[-1][0], ('x', 'y', 'z', 'pan', 'tilt', 'attended'))
+            attended = np.flatnonzero(c['attended'])
+            return Truth(
+                np.column_stack([c['x'], c['y'], c['z']]).astype(float),
+                np.column_stack([c['pan'], c['tilt']]).astype(float),
+                int(attended[0]) if len(attended) else -1,
+            )
+        return self.glance.truth if self.glance and SIM_TRUTH in self.boxes else None
+
+    def _camera(self, image: NDArray[np.uint8]) -> CameraModel:
+        height, width = image.shape[:2]
+        info = self._calibration
+        camera = None
+        if info is not None:
+            camera = CameraModel.from_calibration(
+                info.width or width, info.height or height, info.k, info.d
+            )
+        if camera is None:
+            return CameraModel.from_field_of_view(width, height, _ASSUMED_VIEW_RAD)
+        return camera.resized(width, height)

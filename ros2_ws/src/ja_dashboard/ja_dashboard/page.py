@@ -1,0 +1,282 @@
+"""What the page looks like. It knows a robot's `frame` and its orders, and nothing of ROS."""
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any, Protocol
+
+from nicegui import ui
+
+from ja_common.core.health import Level
+from ja_dashboard.core import drawings
+from ja_dashboard.core.view_model import CurvePoints, Light, Run
+
+PICTURE_URL = '/picture.jpg'
+_PICTURE_EVERY_S = 0.1
+_REST_EVERY_S = 0.25
+_SPEEDS = {0.0: 'as fast as it can', 0.25: '¼ x', 0.5: '½ x', 1.0: '1 x', 2.0: '2 x', 5.0: '5 x'}
+_COLOURS = {
+    Run.WAITING: 'grey', Run.RUNNING: 'green', Run.PAUSED: 'blue', Run.HELD: 'orange',
+    Run.STOPPED: 'red',
+}  # fmt: skip
+_LIGHT_COLOURS = {
+    Level.OK: '#22c55e', Level.WARN: '#f59e0b', Level.ERROR: '#ef4444', Level.STALE: '#64748b',
+}  # fmt: skip
+_STYLE = """
+.ja-page { display: grid; gap: 12px; width: 100%; align-items: start;
+           grid-template-columns: repeat(auto-fit, minmax(min(100%, 21rem), 1fr)) }
+.ja-card { background: #1e293b; border-radius: 10px; padding: 12px; min-width: 0 }
+.ja-card h2 { font-size: .8rem; letter-spacing: .05em; text-transform: uppercase; color: #94a3b8;
+              margin: 0 0 6px; line-height: 1.4 }
+.ja-old { filter: grayscale(1) brightness(.45) }
+.ja-facts { display: grid; grid-template-columns: auto 1fr; gap: 2px 14px; font-size: .9rem }
+.ja-facts dt { color: #94a3b8 } .ja-facts dd { margin: 0; font-variant-numeric: tabular-nums }
+.ja-nodes { width: 100%; font-size: .82rem; border-spacing: 0 3px; border-collapse: separate }
+.ja-nodes td { vertical-align: top; padding-right: 8px; overflow-wrap: anywhere }
+.ja-light { display: inline-block; width: .7em; height: .7em; border-radius: 50% }
+.ja-log * { white-space: pre-wrap; overflow-wrap: anywhere }
+.ja-quiet { color: #94a3b8 }
+body { background: #0f172a }
+"""
+
+
+class Robot(Protocol):
+    """Who is shown: see `ViewNode`, which is one."""
+
+    @property
+    def frame(self) -> Any: ...
+    def watched(self) -> None: ...
+    def show_truth(self, shown: bool) -> None: ...
+    def switch(self, service: str, on: bool) -> None: ...
+    def trigger(self, service: str) -> None: ...
+    def set(self, name: str, value: Any) -> None: ...
+
+
+class Page:
+    """Makes the page for every browser that opens it."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+
+    def build(self) -> None:
+        """Called once a browser."""
+        _View(self._robot)
+
+
+class _View:
+    """One open page."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._shown_log = 0
+        self._shown_stamp = 0
+        self._curve: CurvePoints | None = None
+        # What the robot last said of its switches and settings; true while we repeat it.
+        self._said: dict[str, Any] = {}
+        self._mirroring = False
+        ui.add_css(_STYLE)
+        with ui.row().classes('w-full items-center gap-2'):
+            ui.label('Joint attention').classes('text-lg font-medium')
+            self._badge = ui.badge('').mark('state').classes('text-sm px-2 py-1')
+            self._why = ui.label().mark('why').classes('ja-quiet text-sm')
+        self._orders()
+        with ui.element('div').classes('ja-page'):
+            with self._card('What it sees'):
+                self._picture = ui.interactive_image().classes('w-full')
+            with self._card('The scene from above'):
+                self._scene = ui.html(sanitize=False).classes('w-full')
+                ui.label(
+                    'Orange: objects seen. Yellow: her face. Violet: belief of the learner. '
+                    'Green: the truth. A camera tells directions; the distance is made up.'
+                ).classes('ja-quiet text-xs')
+            with self._card('Pan and tilt within their limits'):
+                self._postures = ui.html(sanitize=False).classes('w-full')
+                ui.label('blue: what is in view; pink cross: the command').classes(
+                    'ja-quiet text-xs'
+                )
+            with self._card('Learning'):
+                self._facts = ui.html(sanitize=False).mark('facts')
+                self._chart = ui.echart(_chart_options()).classes('w-full').style('height: 190px')
+            with self._card('Nodes'):
+                self._nodes = ui.html(sanitize=False).mark('nodes')
+            with self._card('Log'):
+                self._log = ui.log(max_lines=200).classes('ja-log w-full text-xs')
+                self._log.style('height: 220px')
+        ui.timer(_PICTURE_EVERY_S, self._show_picture)
+        ui.timer(_REST_EVERY_S, self._show_rest)
+        self._show_rest()
+
+    @staticmethod
+    def _card(title: str) -> ui.element:
+        card = ui.element('section').classes('ja-card')
+        with card:
+            ui.element('h2').props(f'innerHTML="{escape(title)}"')
+        return card
+
+    def _orders(self) -> None:
+        robot = self._robot
+        with ui.row().classes('w-full items-center gap-2 mb-2') as row:
+            self._switches = {
+                'sim/pause': self._switch('pause', 'sim/pause'),
+                'enable': self._switch('enabled', 'enable'),
+            }
+            self._buttons = {
+                'sim/step': self._button('one step', 'sim/step'),
+                'sim/rearrange': self._button('rearrange', 'sim/rearrange'),
+                'home': self._button('home', 'home'),
+                'save_checkpoint': self._button('save checkpoint', 'save_checkpoint'),
+                'reset_learning': ui.button('reset learning', on_click=self._ask_to_reset)
+                .props('outline dense no-caps color=red')
+                .mark('reset_learning'),
+            }
+            self._settings = {
+                'real_time_factor': self._select('speed', 'real_time_factor', _SPEEDS),
+                'objects': self._select(
+                    'objects', 'objects', {0: 'as the scene', **{n: str(n) for n in range(1, 11)}}
+                ),
+                'learner': self._select('learner', 'learner', {}),
+            }
+            self._truth = ui.switch('the truth', on_change=lambda e: robot.show_truth(e.value))
+        row.style('row-gap: 4px')
+
+    def _switch(self, text: str, service: str) -> ui.switch:
+        def turned(on: bool) -> None:
+            if not self._mirroring:
+                self._robot.switch(service, on)
+
+        return ui.switch(text, on_change=lambda e: turned(e.value)).mark(service)
+
+    def _button(self, text: str, service: str) -> ui.button:
+        button = ui.button(text, on_click=lambda: self._robot.trigger(service))
+        return button.props('outline dense no-caps').mark(service)
+
+    def _select(self, label: str, name: str, options: dict[Any, str]) -> ui.select:
+        def chosen(value: Any) -> None:
+            if not self._mirroring:
+                self._robot.set(name, value)
+
+        select = ui.select(options, label=label, on_change=lambda e: chosen(e.value)).mark(name)
+        return select.props('dense options-dense').classes('min-w-28')
+
+    async def _ask_to_reset(self) -> None:
+        with ui.dialog() as dialog, ui.card():
+            ui.label('Everything that was learned will be forgotten.')
+            with ui.row():
+                ui.button('forget it', on_click=lambda: dialog.submit(True)).props('color=red')
+                ui.button('keep it', on_click=lambda: dialog.submit(False))
+        if await dialog:
+            self._robot.trigger('reset_learning')
+        dialog.delete()
+
+    def _show_picture(self) -> None:
+        """The browser asks for the next picture when it has loaded the last one."""
+        self._robot.watched()
+        picture = self._robot.frame.picture
+        if picture is not None and picture.stamp_ns != self._shown_stamp:
+            self._shown_stamp = picture.stamp_ns
+            self._picture.set_source(f'{PICTURE_URL}?{picture.stamp_ns}')
+
+    def _show_rest(self) -> None:
+        frame = self._robot.frame
+        self._badge.set_text(frame.state.run.value)
+        self._badge.props(f'color={_COLOURS[frame.state.run]}')
+        self._why.set_text(frame.state.text)
+        for shown in (self._picture, self._scene, self._postures):
+            old = not (frame.state.is_live or frame.state.run is Run.PAUSED)
+            shown.classes(add='ja-old' if old else '', remove='' if old else 'ja-old')
+        if frame.glance is not None:
+            self._scene.set_content(drawings.from_above(frame.glance))
+            self._postures.set_content(drawings.postures(frame.glance))
+        self._facts.set_content(facts_html(frame.facts))
+        self._nodes.set_content(nodes_html(frame.lights, frame.latencies_ms))
+        for name, element in {**self._buttons, **self._switches}.items():
+            element.set_visibility(name in frame.services)
+        self._truth.set_visibility('sim/step' in frame.services)
+        for name, choices in frame.choices.items():
+            self._settings[name].set_options({choice: choice for choice in choices})
+        for name, select in self._settings.items():
+            select.set_visibility(name in frame.settings)
+        self._mirror({**self._switches, **self._settings}, {**frame.switches, **frame.settings})
+        if frame.curve is not self._curve:
+            self._curve = frame.curve
+            _fill_chart(self._chart, frame.curve)
+        for number, line in frame.log:
+            if number > self._shown_log:
+                self._shown_log = number
+                self._log.push(line)
+
+    def _mirror(self, elements: dict[str, Any], values: dict[str, Any]) -> None:
+        """Repeat what the robot says when it is news; what somebody just chose is left alone."""
+        self._mirroring = True
+        for name, value in values.items():
+            if name not in self._said or self._said[name] != value:
+                self._said[name] = value
+                element = elements[name]
+                if isinstance(element, ui.select) and value not in element.options:
+                    element.set_options({**dict(element.options), value: str(value)})
+                element.set_value(value)
+        self._mirroring = False
+
+
+def facts_html(facts: dict[str, str]) -> str:
+    """Names and values in two columns."""
+    rows = ''.join(f'<dt>{escape(k)}</dt><dd>{escape(v)}</dd>' for k, v in facts.items())
+    return f'<dl class="ja-facts">{rows}</dl>'
+
+
+def nodes_html(lights: Sequence[Light], latencies_ms: dict[str, float]) -> str:
+    """A light for each node, what it says of itself, and its rates; then the way of an image."""
+    rows = []
+    for light in lights:
+        colour = _LIGHT_COLOURS[light.level]
+        rates = [
+            f'{key.removesuffix(" rate [1/s]")} {value}/s'
+            for key, value in light.values.items()
+            if key.endswith(' rate [1/s]')
+        ]
+        others = [
+            f'{key} {value}'
+            for key, value in light.values.items()
+            if not key.endswith((' rate [1/s]', ' received'))
+        ]
+        told = '<br>'.join(escape(text) for text in ([light.message] if light.level else []))
+        figures = escape(', '.join([*others, *rates]))
+        rows.append(
+            f'<tr><td><span class="ja-light" style="background:{colour}" '
+            f'title="{light.level.name}"></span></td><td>{escape(light.node.lstrip("/"))}'
+            f'<div>{told}</div><div class="ja-quiet">{figures}</div></td></tr>'
+        )
+    way = ', '.join(f'{name} {ms:.1f} ms' for name, ms in latencies_ms.items())
+    after = f'<div class="ja-quiet text-xs">after an image: {escape(way)}</div>' if way else ''
+    return f'<table class="ja-nodes">{"".join(rows)}</table>{after}'
+
+
+def _chart_options() -> dict[str, Any]:
+    line = {'type': 'line', 'showSymbol': False, 'data': []}
+    thin = {**line, 'lineStyle': {'opacity': 0.0}, 'stack': 'interval', 'tooltip': {'show': False}}
+    return {
+        'animation': False,
+        'grid': {'left': 34, 'right': 8, 'top': 28, 'bottom': 24},
+        'legend': {'top': 0, 'data': ['success', 'p(LM)'], 'textStyle': {'color': '#94a3b8'}},
+        'xAxis': {'type': 'value', 'max': 'dataMax', 'splitLine': {'show': False}},
+        'yAxis': {
+            'type': 'value',
+            'min': 0,
+            'max': 1,
+            'splitLine': {'lineStyle': {'color': '#334155'}},
+        },
+        'tooltip': {'trigger': 'axis'},
+        'series': [
+            {**thin, 'name': 'low'},
+            {**thin, 'name': 'interval', 'areaStyle': {'opacity': 0.25, 'color': '#38bdf8'}},
+            {**line, 'name': 'success', 'color': '#38bdf8'},
+            {**line, 'name': 'p(LM)', 'color': '#f472b6', 'lineStyle': {'type': 'dashed'}},
+        ],
+    }
+
+
+def _fill_chart(chart: ui.echart, curve: CurvePoints) -> None:
+    widths = [high - low for low, high in zip(curve.low, curve.high, strict=True)]
+    columns = (curve.low, widths, curve.rate, curve.p_lm)
+    for series, column in zip(chart.options['series'], columns, strict=True):
+        series['data'] = [list(point) for point in zip(curve.trials, column, strict=True)]
+    chart.update()

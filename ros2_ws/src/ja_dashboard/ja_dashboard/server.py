@@ -1,0 +1,78 @@
+"""Serves the page from a thread of its own; it ends with the process."""
+
+import asyncio
+import socket
+import threading
+
+import uvicorn
+from fastapi import FastAPI, Response
+from nicegui import ui
+
+from ja_common.core.config import ConfigError
+from ja_dashboard.page import PICTURE_URL, Page, Robot
+
+_GRACE_S = 1
+_PORTS = 50
+
+
+class Server(threading.Thread):
+    """Web server of the live page, as a context manager; `address` is what to open."""
+
+    def __init__(self, robot: Robot, host: str, port: int) -> None:
+        """Take the port, or the next one that is free. Raises ConfigError when none is."""
+        super().__init__(name='web server', daemon=True)
+        self._socket = _listen(host, port)
+        shown = '127.0.0.1' if host == '0.0.0.0' else host
+        self.address = f'http://{shown}:{self._socket.getsockname()[1]}'
+        self._server = uvicorn.Server(
+            uvicorn.Config(web_app(robot), log_level='warning', timeout_graceful_shutdown=_GRACE_S)
+        )
+
+    def __enter__(self) -> 'Server':
+        self.start()
+        return self
+
+    def run(self) -> None:
+        asyncio.run(self._server.serve(sockets=[self._socket]))
+
+    def __exit__(self, *_: object) -> None:
+        self._server.should_exit = True
+        self.join(2 * _GRACE_S)
+
+
+def web_app(robot: Robot) -> FastAPI:
+    """The page of a robot, and its picture."""
+    app = picture_app(robot)
+    ui.run_with(app, root=Page(robot).build, title='Joint attention', dark=True)
+    return app
+
+
+def picture_app(robot: Robot) -> FastAPI:
+    """The newest picture as JPEG, drawn when it is asked for: the browser sets the pace.
+
+    Who asks for it watches the robot.
+    """
+    app = FastAPI()
+
+    @app.get(PICTURE_URL)
+    def picture() -> Response:
+        robot.watched()
+        shown = robot.frame.picture
+        if shown is None:
+            return Response(status_code=404)
+        headers = {'Cache-Control': 'no-store'}
+        return Response(shown.jpeg(), media_type='image/jpeg', headers=headers)
+
+    return app
+
+
+def _listen(host: str, first_port: int) -> socket.socket:
+    last_port = min(first_port + _PORTS - 1, 65535)
+    for port in range(first_port, last_port + 1):
+        try:
+            return socket.create_server((host, port))
+        except OSError as error:
+            reason = error.strerror
+    raise ConfigError(
+        f'the page cannot be served on {host}, ports {first_port} to {last_port}: {reason}'
+    )

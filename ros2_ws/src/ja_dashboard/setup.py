@@ -1,0 +1,25 @@
+from setuptools import find_packages, setup
+
+PACKAGE = 'ja_dashboard'
+DATA = ('yaml', 'xml', 'obj', 'png', 'jpg', 'npz', 'tflite', 'caffemodel', 'prototxt', 'txt', 'md')
+
+setup(
+    name=PACKAGE,
+    version='0.1.0',
+    description='The live page: what the head sees and does, in a browser.',
+    license='Apache-2.0',
+    maintainer='The Joint Attention team',
+    maintainer_email='joint-attention@example.org',
+    packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
+    package_data={PACKAGE: [f'**/*.{extension}' for extension in DATA]},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
+        (f'share/{PACKAGE}', ['package.xml']),
+    ],
+    zip_safe=False,
+    entry_points={
+        'console_scripts': [
+            'view = ja_dashboard.view_node:main',
+        ],
+    },
+)

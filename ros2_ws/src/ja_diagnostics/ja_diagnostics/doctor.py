@@ -1,0 +1,177 @@
+"""`./ja doctor`: is everything there that the graph needs, and how to mend what is not."""
+
+import errno
+import glob
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from ja_diagnostics import image_stream
+
+_PYTHONS = ((3, 10), (3, 13))
+_SHM_MB = 64
+_RENDER = """
+from ja_sim.core.scene import load_scene
+from ja_sim.core.world import JointAttentionWorld
+world = JointAttentionWorld(load_scene('easy'), 0, image_size=(64, 48))
+print(world.observe().image.std() > 0)
+"""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one check found. `mend`: what to do; '' when nothing is wrong.
+
+    `needed`: does the simulated head need it? A camera that is missing is no illness.
+    """
+
+    name: str
+    well: bool
+    text: str
+    mend: str = ''
+    needed: bool = True
+
+
+def checks() -> dict[str, Callable[[], Finding]]:
+    """All checks by name, in the order in which one depends on another."""
+    return {
+        'Python': check_python,
+        'rclpy': check_rclpy,
+        'shared memory': check_shared_memory,
+        'stale segments': check_stale_segments,
+        'ports': check_ports,
+        'discovery': check_discovery,
+        'graphics': check_graphics,
+        'camera': check_camera,
+    }
+
+
+def check_python() -> Finding:
+    version = sys.version_info[:2]
+    text = '.'.join(map(str, version))
+    well = _PYTHONS[0] <= version <= _PYTHONS[1]
+    return Finding('Python', well, text, '' if well else 'set JA_PYTHON to a Python 3.10 to 3.13')
+
+
+def check_rclpy() -> Finding:
+    try:
+        import rclpy
+
+        middleware = rclpy.get_rmw_implementation_identifier()
+    except Exception as error:
+        mend = 'delete .venv and run ./ja again; with ROS sourced, use the Python it is made for'
+        return Finding('rclpy', False, f'{type(error).__name__}: {error}', mend)
+    well = middleware == 'rmw_fastrtps_cpp'
+    mend = '' if well else 'unset RMW_IMPLEMENTATION: only Fast DDS is tested'
+    return Finding('rclpy', well, f'{Path(rclpy.__file__).parent}, {middleware}', mend)
+
+
+def check_shared_memory(folder: Path = Path('/dev/shm')) -> Finding:
+    if not os.access(folder, os.W_OK):
+        mend = f'mount a tmpfs at {folder}; until then images go over UDP, slowly'
+        return Finding('shared memory', False, f'{folder} cannot be written', mend)
+    free_mb = shutil.disk_usage(folder).free // 10**6
+    well = free_mb >= _SHM_MB
+    mend = '' if well else 'remove stale segments, or give a container more (--shm-size=512m)'
+    return Finding('shared memory', well, f'{free_mb} MB free in {folder}', mend)
+
+
+def check_stale_segments(folder: Path = Path('/dev/shm')) -> Finding:
+    """Segments of Fast DDS that no living process has mapped or open; harmless but large."""
+    files = {Path(path) for path in glob.glob(f'{folder}/fastrtps_*')}
+    used = _files_in_use()
+    stale = sorted(
+        path for path in files if str(path) not in used and not path.name.endswith('_el')
+    )
+    if not stale:
+        return Finding('stale segments', True, 'none')
+    size_mb = sum(path.stat().st_blocks * 512 for path in stale if path.exists()) / 1e6
+    mend = f'when no ROS 2 program runs: rm {folder}/fastrtps_* {folder}/sem.fastrtps_*'
+    text = f'{len(stale)} left behind by killed processes, {size_mb:.1f} MB'
+    return Finding('stale segments', size_mb < _SHM_MB, text, mend, needed=False)
+
+
+def check_ports() -> Finding:
+    domain = int(os.environ.get('ROS_DOMAIN_ID') or 0)
+    port = 7400 + 250 * domain + 10  # unicast discovery of the first participant (DDSI-RTPS)
+    if not 0 <= domain <= 101:
+        mend = 'choose ROS_DOMAIN_ID from 0 to 101: above, the ports collide with the system'
+        return Finding('ports', False, f'domain {domain}', mend)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as test:
+        try:
+            test.bind(('127.0.0.1', port))
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE:
+                mend = 'allow UDP on the loopback interface'
+                return Finding('ports', False, f'UDP {port}: {error.strerror}', mend)
+            text = f'domain {domain}: in use, another ROS 2 graph runs there'
+            mend = 'for a graph of your own choose another ROS_DOMAIN_ID'
+            return Finding('ports', True, text, mend, needed=False)
+    return Finding('ports', True, f'domain {domain}: free, UDP from {port}')
+
+
+def check_discovery() -> Finding:
+    """Images from one process to another."""
+    command = [sys.executable, '-m', image_stream.__name__]
+    hear = subprocess.Popen(
+        [*command, 'hear'], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
+    say = subprocess.Popen(
+        [*command, 'say'], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
+    try:
+        found_s = json.loads(say.communicate(timeout=60)[0])['discovery_s']
+        delays_ms = json.loads(hear.communicate(timeout=60)[0])['delays_ms']
+    except (ValueError, KeyError, subprocess.TimeoutExpired):
+        mend = 'unset FASTRTPS_DEFAULT_PROFILES_FILE and ROS_AUTOMATIC_DISCOVERY_RANGE'
+        return Finding('discovery', False, 'two processes did not find each other', mend)
+    finally:
+        for process in (hear, say):
+            process.kill()
+            process.wait()
+    share = len(delays_ms) / image_stream.IMAGES
+    text = f'found in {found_s:.2f} s, {share:.0%} of 640x480 images at 60 Hz arrived'
+    mend = '' if share > 0.9 else 'the machine is busy, or shared memory is not used: see above'
+    return Finding('discovery', share > 0.5, text, mend)
+
+
+def check_graphics() -> Finding:
+    """In a process of its own: a broken driver may end it."""
+    found = subprocess.run(
+        [sys.executable, '-c', _RENDER], capture_output=True, text=True, check=False
+    )
+    if found.stdout.strip() == 'True':
+        backend = os.environ.get('MUJOCO_GL') or 'chosen by the sim'
+        return Finding('graphics', True, f'an image is rendered (MUJOCO_GL: {backend})')
+    lines = found.stderr.strip().splitlines() or [f'exit code {found.returncode}']
+    mend = 'sudo apt-get install -y libegl1 libgl1-mesa-dri, or libosmesa6 and MUJOCO_GL=osmesa'
+    return Finding('graphics', False, lines[-1], mend)
+
+
+def check_camera() -> Finding:
+    devices = sorted(glob.glob('/dev/video*'))
+    readable = [device for device in devices if os.access(device, os.R_OK | os.W_OK)]
+    if readable:
+        return Finding('camera', True, ', '.join(readable), needed=False)
+    if devices:
+        mend = 'sudo usermod -aG video $USER, and log in again'
+        return Finding('camera', False, f'{", ".join(devices)}: no permission', mend, needed=False)
+    mend = 'not needed for ./ja demo; ./ja rig --source takes a video file or a folder, too'
+    return Finding('camera', False, 'none', mend, needed=False)
+
+
+def _files_in_use() -> set[str]:
+    used = set()
+    for maps in glob.glob('/proc/[0-9]*/maps'):
+        try:
+            lines = Path(maps).read_text().splitlines()
+        except OSError:
+            continue  # ended meanwhile, or another user's
+        used |= {line.split(maxsplit=5)[-1] for line in lines if '/fastrtps_' in line}
+    return used

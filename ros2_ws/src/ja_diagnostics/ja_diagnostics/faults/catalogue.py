@@ -1,0 +1,93 @@
+"""The faults: how each begins and ends, how long it lasts, and whether the head has to stop."""
+
+import os
+import signal
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from ja_common.topics import CAMERA_INFO, IMAGE, JOINT_STATES, Topic
+from ja_diagnostics.faults.disturbance import Disturbance
+from ja_diagnostics.faults.relay import Relay
+
+LASTS_S = 5.0
+_CAMERA = (IMAGE, CAMERA_INFO)
+_JOINTS = (JOINT_STATES,)
+_silence = partial(Disturbance, silent=True)
+_delay = partial(Disturbance, delay_s=0.1)
+_disorder = partial(Disturbance, swapped=True)
+
+
+@dataclass(frozen=True)
+class Graph:
+    """What a fault can get at: the processes by node, and the relay behind the head."""
+
+    pids: Callable[[], Mapping[str, int]]
+    relay: Relay
+
+    def send(self, thing: str, number: int) -> None:
+        """A signal to a node's process."""
+        os.kill(self.pids()[thing], number)
+
+
+Action = Callable[[Graph], None]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """`stops`: has the head to stop? Else it has to go on."""
+
+    name: str
+    begin: Action
+    end: Action
+    lasts_s: float = LASTS_S
+    stops: bool = True
+
+
+def faults(things: list[str]) -> list[Fault]:
+    """All faults of a graph with these nodes in processes of their own."""
+    return [
+        *(fault for thing in things for fault in (_killed(thing), _frozen(thing))),
+        _disturbed('camera stopped', _CAMERA, _silence),
+        _disturbed('joint states stopped', _JOINTS, _silence),
+        _disturbed('joint states delayed by 0.1 s', _JOINTS, _delay, stops=False),
+        _disturbed('joint states out of order', _JOINTS, _disorder, stops=False),
+        _clock_set_back(),
+    ]
+
+
+def _killed(thing: str) -> Fault:
+    # Restarted by the supervisor, at once: no Python is up again before this is over.
+    return Fault(
+        f'{thing} killed -9', lambda graph: graph.send(thing, signal.SIGKILL), _nothing, 0.5
+    )
+
+
+def _frozen(thing: str) -> Fault:
+    return Fault(
+        f'{thing} frozen',
+        lambda graph: graph.send(thing, signal.SIGSTOP),
+        lambda graph: graph.send(thing, signal.SIGCONT),
+    )
+
+
+def _disturbed(
+    name: str, topics: Sequence[Topic], make: Callable[[], Disturbance], stops: bool = True
+) -> Fault:
+    return Fault(
+        name,
+        lambda graph: graph.relay.disturb(topics, make),
+        lambda graph: graph.relay.disturb(topics, Disturbance),
+        stops=stops,
+    )
+
+
+def _clock_set_back() -> Fault:
+    def begin(graph: Graph) -> None:
+        graph.relay.clock_ahead_s -= 3.0
+
+    return Fault('clock set back by 3 s', begin, _nothing, 2.0, stops=False)
+
+
+def _nothing(_: Graph) -> None:
+    pass

@@ -1,0 +1,124 @@
+"""`./ja topics`: what the running graph says, how, how often, and what for."""
+
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rich.table import Table
+
+from ja_common.core.config import ConfigError
+from ja_common.message_types import message_class
+from ja_common.qos_text import common_profile
+from ja_common.topics import TOPICS
+
+_DISCOVERY_S = 0.6
+
+
+@dataclass(frozen=True)
+class TopicRow:
+    """One topic of the graph; `rate_hz` is None where its type is not installed here."""
+
+    name: str
+    type: str
+    quality: str
+    publishers: list[str]
+    subscribers: list[str]
+    rate_hz: float | None
+    purpose: str
+
+
+def look_at_topics(seconds: float, arguments: Sequence[str] = ()) -> list[TopicRow]:
+    """Watch the graph for a while; its topics by name. Empty: nobody is there."""
+    context = Context()
+    cli = ['--ros-args', *arguments] if arguments else []
+    rclpy.init(args=cli, context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
+    node = Node('topics_table', context=context, enable_rosout=False)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    try:
+        _spin(executor, _DISCOVERY_S)
+        said = {
+            name: types[0]
+            for name, types in node.get_topic_names_and_types()
+            if _others(node, node.get_publishers_info_by_topic(name))
+        }
+        counts: Counter[str] = Counter()
+        unknown = [name for name, kind in said.items() if not _count(node, name, kind, counts)]
+        began_s = time.monotonic()
+        _spin(executor, seconds)
+        elapsed_s = time.monotonic() - began_s
+        rates = {name: None if name in unknown else counts[name] / elapsed_s for name in said}
+        return [_row(node, name, said[name], rates[name]) for name in sorted(said)]
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+        context.try_shutdown()
+
+
+def table_of_topics(rows: Sequence[TopicRow]) -> Table:
+    """For people."""
+    table = Table(show_lines=False)
+    for column in ('topic', 'type', 'quality', 'publishers', 'heard by'):
+        table.add_column(column, overflow='fold')
+    table.add_column('Hz', justify='right')
+    table.add_column('what it is', overflow='fold')
+    for row in rows:
+        rate = '?' if row.rate_hz is None else f'{row.rate_hz:.1f}'
+        names = (', '.join(row.publishers), ', '.join(row.subscribers) or '-')
+        table.add_row(row.name, row.type, row.quality, *names, rate, row.purpose)
+    return table
+
+
+def _count(node: Node, name: str, type_name: str, counts: Counter[str]) -> bool:
+    """Count a topic's messages from now on, undecoded; False when its type is not installed."""
+    try:
+        kind = message_class(type_name)
+    except ConfigError:
+        return False
+
+    def heard(_: bytes) -> None:
+        counts[name] += 1
+
+    # Best effort matches every publisher, and holds none up.
+    node.create_subscription(kind, name, heard, common_profile(False, False), raw=True)
+    return True
+
+
+def _row(node: Node, name: str, type_name: str, rate_hz: float | None) -> TopicRow:
+    publishers = _others(node, node.get_publishers_info_by_topic(name))
+    subscribers = _others(node, node.get_subscriptions_info_by_topic(name))
+    purposes = {topic.name.lstrip('/'): topic.purpose for topic in TOPICS}
+    # In a namespace, too: the longest of our names that it ends with.
+    fitting = [own for own in purposes if f'/{name}'.endswith(f'/{own}')]
+    return TopicRow(
+        name,
+        type_name.replace('/msg/', '/'),
+        '; '.join(sorted({_quality(end.qos_profile) for end in publishers})),
+        sorted({end.node_name for end in publishers}),
+        sorted({end.node_name for end in subscribers}),
+        rate_hz,
+        purposes[max(fitting, key=len)] if fitting else '',
+    )
+
+
+def _others(node: Node, ends: list[Any]) -> list[Any]:
+    return [end for end in ends if end.node_name != node.get_name()]
+
+
+def _quality(profile: QoSProfile) -> str:
+    reliable = profile.reliability is ReliabilityPolicy.RELIABLE
+    latched = profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+    return ('reliable' if reliable else 'best effort') + (', latched' if latched else '')
+
+
+def _spin(executor: SingleThreadedExecutor, seconds: float) -> None:
+    end_s = time.monotonic() + seconds
+    while (left_s := end_s - time.monotonic()) > 0:
+        executor.spin_once(timeout_sec=left_s)

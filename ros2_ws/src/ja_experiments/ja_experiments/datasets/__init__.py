@@ -1,0 +1,1 @@
+"""Looks at the caregiver: rendered, recorded, kept on disk."""

@@ -1,0 +1,197 @@
+"""Looks at the caregiver: the data sets of section 3.1, rendered once and kept.
+
+The robot looks at the caregiver of the rendered world, waits for her gaze, looks aside, and looks
+again; the picture of her face comes from the detector and the crop of the live graph. Where the
+attended object stands is the world's truth: the experiment places the object there, and the
+learner is never told.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
+from importlib import metadata, resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ja_common.core.detection import caregiver_face
+from ja_common.core.geometry import directions_of_rays
+from ja_control.core.attention_cycle import Phase
+from ja_experiments.agents.robot import FixedTurn, Robot
+from ja_experiments.config import ExperimentConfig
+from ja_experiments.datasets.rendered import DWELL_S, RenderedTask
+from ja_sim.core.scene import load_scene
+from ja_sim.core.world import JointAttentionWorld
+
+POOL = 125
+"""How many data sets the paper learns from."""
+FRESH = 1000
+"""How many more looks at the same person there are to test on."""
+IMAGE_SIZE = (320, 240)
+_ASIDE_RAD = (0.35, 0.0)
+_MADE_BY = ('ja_common', 'ja_perception', 'ja_control', 'ja_sim')
+_LIBRARIES = ('mujoco', 'numpy', 'opencv-python-headless')
+_FILES = ('.py', '.npz', '.png', '.xml', '.yaml', '.tflite')
+
+
+@dataclass(frozen=True)
+class Looks:
+    """What was seen of the caregiver's face, and where the thing was that she looked at.
+
+    `faces`: uint8 (n, 30, 25), seen in the directions `faces_at`, (n, 2) [rad]. `postures`: (n, 2)
+    [rad], of the head that looked at her.
+    `directions`: (n, 2) [rad], of the object that she attended to (the paper's motor command is
+    what is between the two).
+    """
+
+    faces: NDArray[np.uint8]
+    faces_at: NDArray[np.float64]
+    postures: NDArray[np.float64]
+    directions: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.faces)
+
+    def __getitem__(self, chosen: slice) -> Looks:
+        return Looks(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
+
+def cache_folder() -> Path:
+    """Where looks are kept: $JA_CACHE, or joint-attention in the user's cache folder."""
+    home = os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache'
+    return Path(os.environ.get('JA_CACHE') or Path(home) / 'joint-attention')
+
+
+def load_looks(
+    scene: str = 'default',
+    seed: int = 0,
+    count: int = POOL + FRESH,
+    folder: Path | None = None,
+    say: Callable[[str], None] = print,
+    progress: Callable[[int], None] = lambda more: None,
+) -> Looks:
+    """Looks at the caregiver that `seed` makes of a scene, from `folder` or newly rendered.
+
+    What is kept is used only if its checksum is right and if nothing has changed that it was
+    made by: scene, seed, sources of the sim and of the perception, libraries.
+    """
+    kept = (folder or cache_folder()) / f'looks-{Path(scene).stem}-{seed}-{count}'
+    maker = _maker(scene, seed, count)
+    try:
+        looks = _read(kept, maker)
+    except _NotUsableError as why:
+        say(f'Rendering {count} looks at the caregiver ({why}).')
+    else:
+        progress(count)
+        return looks
+    looks = _render(scene, seed, count, progress)
+    _write(kept, maker, looks)
+    return looks
+
+
+class _NotUsableError(Exception):
+    """Why looks must be rendered again."""
+
+
+def _read(kept: Path, maker: dict[str, Any]) -> Looks:
+    try:
+        manifest = json.loads((kept / 'manifest.json').read_text(encoding='utf-8'))
+        data = (kept / 'looks.npz').read_bytes()
+    except FileNotFoundError:
+        raise _NotUsableError(f'none are kept in {kept}') from None
+    except (OSError, ValueError) as error:
+        raise _NotUsableError(f'those in {kept} cannot be read: {error}') from None
+    if not isinstance(manifest, dict) or manifest.get('sha256') != _sha256([data]):
+        raise _NotUsableError(f'those in {kept} are damaged')
+    made_by = manifest.get('made_by', {})
+    changed = [key for key, value in maker.items() if made_by.get(key) != value]
+    if changed:
+        raise _NotUsableError(f'those in {kept} were made by other {", ".join(changed)}')
+    with np.load(kept / 'looks.npz', allow_pickle=False) as arrays:
+        return Looks(**{field.name: arrays[field.name] for field in fields(Looks)})
+
+
+def _write(kept: Path, maker: dict[str, Any], looks: Looks) -> None:
+    """Write all or nothing: two processes may be at it."""
+    made = kept.with_name(f'.{kept.name}.{os.getpid()}')
+    made.mkdir(parents=True)
+    np.savez_compressed(made / 'looks.npz', **vars(looks))
+    manifest = {
+        'sha256': _sha256([(made / 'looks.npz').read_bytes()]),
+        'made_at': time.strftime('%Y-%m-%dT%H:%M:%S%z'),
+        'made_by': maker,
+    }
+    (made / 'manifest.json').write_text(json.dumps(manifest, indent=2), encoding='utf-8')
+    shutil.rmtree(kept, ignore_errors=True)
+    made.rename(kept)
+
+
+def _maker(scene: str, seed: int, count: int) -> dict[str, Any]:
+    """All that the looks depend on."""
+    return {
+        'scene': repr(load_scene(scene)),
+        'seed': seed,
+        'count': count,
+        'sources': _sha256(_sources()),
+        **{library: metadata.version(library) for library in _LIBRARIES},
+    }
+
+
+def _sources() -> Iterator[bytes]:
+    """Core modules and data of the packages that make a look, and this module's own procedure."""
+    for package in _MADE_BY:
+        root = Path(str(resources.files(package)))
+        # Nodes pass the looks on without a part in them.
+        for path in sorted(p for p in root.rglob('*') if p.suffix in _FILES):
+            if path.parent != root:
+                yield path.relative_to(root).as_posix().encode()
+                yield path.read_bytes()
+    for name in ('looks.py', 'rendered.py', 'robot.py'):
+        yield Path(__file__).with_name(name).read_bytes()
+
+
+def _sha256(chunks: Iterator[bytes] | list[bytes]) -> str:
+    digest = hashlib.sha256()
+    for chunk in chunks:
+        digest.update(chunk)
+    return digest.hexdigest()
+
+
+def _render(scene: str, seed: int, count: int, progress: Callable[[int], None]) -> Looks:
+    """Look at her, wait, look aside, and again."""
+    config = ExperimentConfig().with_settings(
+        {'dwell_s': DWELL_S, 'max_shifts': 1, 'gating': 'constant', 'p_lm_max': 1.0}
+    )
+    world = JointAttentionWorld(load_scene(scene), seed, IMAGE_SIZE)
+    task = RenderedTask(world, Robot(config, FixedTurn(_ASIDE_RAD), np.random.default_rng(seed)))
+    faces: list[NDArray] = []
+    faces_at: list[NDArray] = []
+    postures: list[NDArray] = []
+    directions: list[NDArray] = []
+    trial = 0
+    try:
+        while len(faces) < count:
+            sight = task.advance()
+            watched = sight.step.decision.phase is Phase.SHIFT
+            face, picture = caregiver_face(sight.percept.detections), sight.percept.face_image
+            # She may not have noticed that the robot looked away: then it is the same look.
+            if not watched or face is None or picture is None:
+                continue
+            if sight.truth.trial > trial:
+                trial = sight.truth.trial
+                faces.append(picture)
+                faces_at.append(directions_of_rays(sight.posture.position, face.ray))
+                postures.append(sight.posture.position)
+                directions.append(sight.truth.directions[sight.truth.attended])
+                progress(1)
+    finally:
+        world.close()
+    return Looks(*map(np.array, (faces, faces_at, postures, directions)))

@@ -1,0 +1,52 @@
+"""The robot in the rendered world: pictures through the graph's own detector, without ROS."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ja_common.core.camera_model import CameraModel
+from ja_common.core.posture import Posture
+from ja_experiments.agents.robot import Robot, Step
+from ja_perception.core.blazeface import BlazeFace
+from ja_perception.core.detector import Percept, SalientFeatureDetector
+from ja_sim.core.world import JointAttentionWorld, Truth
+
+IMAGE_PERIOD_S = 0.1
+DWELL_S = 0.5
+"""How long to watch the face: it shows where she looks after her reaction and her turn."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """One image, and what was made of it. `truth` is for whoever scores or draws, not to learn."""
+
+    image: NDArray[np.uint8]
+    camera: CameraModel
+    percept: Percept
+    posture: Posture
+    step: Step
+    truth: Truth
+
+
+class RenderedTask:
+    """Joins a world, the eyes and a robot; one `advance` an image."""
+
+    def __init__(self, world: JointAttentionWorld, robot: Robot) -> None:
+        self._world, self._robot = world, robot
+        self._detector = SalientFeatureDetector(BlazeFace())
+
+    def advance(self) -> Sight:
+        """Let the head follow the last command, take a picture, and act on it."""
+        self._world.step(IMAGE_PERIOD_S)
+        seen, joints, truth = self._world.observe(), self._world.joint_state(), self._world.truth()
+        posture = Posture(seen.stamp_ns, joints.position, joints.velocity)
+        camera = CameraModel(
+            seen.intrinsics.width, seen.intrinsics.height, seen.fx, seen.fy, seen.cx, seen.cy
+        )
+        percept = self._detector.look(seen.image, seen.stamp_ns, camera, posture)
+        step = self._robot.step(percept.detections, percept.face_image, posture)
+        self._world.command(step.command)
+        return Sight(seen.image, camera, percept, posture, step, truth)

@@ -1,0 +1,155 @@
+"""All that `./ja figures` computes: both readings of the paper, and on demand the ablations."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import torch
+import yaml
+
+from ja_experiments.config import READINGS, reading
+from ja_experiments.datasets.looks import FRESH, POOL, load_looks
+from ja_experiments.datasets.recorded import recorded_materials
+from ja_experiments.paper.experiment import Condition, Materials, Plan, run_conditions
+from ja_experiments.paper.strips import Episode, watch
+from ja_experiments.progress import Progress
+from ja_sim.core.scene import load_scene
+
+OBJECTS = (1, 3, 5, 10)
+FEATURED_OBJECTS = 5
+"""The count that Figures 6 (c) and 7, the stages and the ablations are about."""
+
+
+@dataclass(frozen=True)
+class StudyConfig:
+    """What to compute. No ablations when `ablation_seeds` is 0.
+
+    `looks_seed`: which caregiver is looked at. `data`: folder of a recorded data set, in place of
+    a rendered caregiver; then there is no Figure 7, because the world around her is not known.
+    `pool`: looks of the data to learn from; 0: as many as the paper, or four fifths of them.
+    `episodes`: trials watched for Figure 7.
+    """
+
+    plan: Plan = field(default_factory=Plan)
+    scene: str = 'default'
+    looks_seed: int = 0
+    data: str = ''
+    pool: int = 0
+    episodes: int = 40
+    ablation_seeds: int = 0
+    workers: int = os.cpu_count() or 1
+
+
+@dataclass(frozen=True)
+class Study:
+    """What has been computed; conditions by reading, then by object count or by variant."""
+
+    config: StudyConfig
+    materials: Materials
+    by_objects: dict[str, dict[int, Condition]]
+    episodes: dict[str, list[Episode]]
+    ablations: dict[str, dict[str, Condition]]
+    seconds: dict[str, float]
+
+    def featured(self) -> dict[str, Condition]:
+        """The condition of each reading that is looked into."""
+        return {name: found[FEATURED_OBJECTS] for name, found in self.by_objects.items()}
+
+
+def run_study(config: StudyConfig, progress: Progress) -> Study:
+    """Compute everything; the time of each part goes into `seconds`."""
+    torch.set_num_threads(1)
+    seconds: dict[str, float] = {}
+    with _timed(seconds, 'looks at the caregiver'):
+        if config.data:
+            materials = recorded_materials(Path(config.data), config.pool, config.scene)
+        else:
+            materials = prepare_materials(config.scene, config.looks_seed, progress)
+    with _timed(seconds, 'compilation'):
+        compile_kernel(materials)
+    by_objects, episodes, ablations = {}, {}, {}
+    for name in READINGS:
+        with _timed(seconds, f'figure 6, pairs: {name}'):
+            by_objects[name] = _figure_6(name, config, materials, progress)
+    for name in () if config.data else READINGS:
+        with _timed(seconds, f'figure 7, pairs: {name}'):
+            featured = by_objects[name][FEATURED_OBJECTS]
+            episodes[name] = _figure_7(name, featured, config, progress)
+    for name in READINGS if config.ablation_seeds else ():
+        with _timed(seconds, f'ablations, pairs: {name}'):
+            ablations[name] = _ablations(name, config, materials, progress)
+    return Study(config, materials, by_objects, episodes, ablations, seconds)
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], part: str) -> Iterator[None]:
+    start = time.perf_counter()
+    yield
+    seconds[part] = time.perf_counter() - start
+
+
+def compile_kernel(materials: Materials) -> None:
+    """Compile (or load) the kernel, so that no measured time contains it."""
+    run_conditions({'': reading('all')}, Plan(trials=30, seeds=(0,), test_trials=1), materials)
+
+
+def read_ablations(path: Path | None = None) -> dict[str, dict[str, Any]]:
+    """Settings by the name of the variant, from a YAML file or from the one of the package."""
+    shipped = resources.files('ja_experiments.paper') / 'ablations.yaml'
+    text = path.read_text('utf-8') if path else shipped.read_text('utf-8')
+    return yaml.safe_load(text)
+
+
+def prepare_materials(scene: str, looks_seed: int, progress: Progress) -> Materials:
+    """The looks at the caregiver of a scene, rendered if they are not kept, and its places."""
+    with progress.bar('looks at the caregiver', POOL + FRESH) as advance:
+        looks = load_looks(scene, looks_seed, say=progress.say, progress=advance)
+    origin = (
+        f'looks at a rendered caregiver (scene `{scene}`, seed {looks_seed}), through the face '
+        'detector and the crop of the live graph'
+    )
+    return Materials.of(looks, load_scene(scene).objects, origin)
+
+
+def _figure_6(
+    name: str, config: StudyConfig, materials: Materials, progress: Progress
+) -> dict[int, Condition]:
+    configs = {str(n): reading(name).with_settings({'objects': n}) for n in OBJECTS}
+    with progress.bar(f'figure 6, pairs: {name}', _trials(configs, config.plan)) as advance:
+        found = run_conditions(configs, config.plan, materials, config.workers, advance)
+    return {n: found[str(n)] for n in OBJECTS}
+
+
+def _figure_7(
+    name: str, condition: Condition, config: StudyConfig, progress: Progress
+) -> list[Episode]:
+    with progress.bar(f'figure 7, pairs: {name}', config.episodes) as advance:
+        return watch(
+            condition.config,
+            condition.runs[0].network,
+            config.scene,
+            config.looks_seed,
+            config.episodes,
+            advance,
+        )
+
+
+def _ablations(
+    name: str, config: StudyConfig, materials: Materials, progress: Progress
+) -> dict[str, Condition]:
+    base = reading(name).with_settings({'objects': FEATURED_OBJECTS})
+    configs = {label: base.with_settings(changed) for label, changed in read_ablations().items()}
+    plan = replace(config.plan, seeds=config.plan.seeds[: config.ablation_seeds])
+    with progress.bar(f'ablations, pairs: {name}', _trials(configs, plan)) as advance:
+        return run_conditions(configs, plan, materials, config.workers, advance)
+
+
+def _trials(configs: dict[str, Any], plan: Plan) -> int:
+    return len(configs) * len(plan.seeds) * plan.trials

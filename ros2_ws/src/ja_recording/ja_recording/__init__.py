@@ -1,0 +1,1 @@
+"""Recordings of the graph: record, play back, cut into trials, data sets."""

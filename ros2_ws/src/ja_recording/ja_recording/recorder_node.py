@@ -1,0 +1,152 @@
+"""`recorder`: every topic of the graph, whatever its type, into a folder of MCAP files."""
+
+import re
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+
+from ja_common.core.config import ConfigError, parameter
+from ja_common.core.health import Level
+from ja_common.graph_node import GraphNode, spin_node
+from ja_common.message_types import message_class, schema_of
+from ja_common.qos_text import common_profile, offered_text
+from ja_recording.background_writer import BackgroundWriter, Sample
+from ja_recording.recording_folder import Channel, Limits, RecordingFolder
+
+_LOOK_EVERY_S = 0.2
+_DEPTH = 200
+
+
+@dataclass(frozen=True)
+class RecorderConfig:
+    """What is recorded, where, and how much of it is kept."""
+
+    folder: str = parameter('', 'folder of the recording; empty: runs/<time>-record')
+    # Somebody who listens to the annotated image makes the detector draw it.
+    exclude: str = parameter(
+        'image_annotated', 'regular expression: topics that it matches anywhere are left out'
+    )
+    split_mb: float = parameter(256.0, 'begin a new file beyond so many MB; 0: never', low=0.0)
+    split_s: float = parameter(600.0, 'begin a new file after so many seconds; 0: never', low=0.0)
+    keep_mb: float = parameter(
+        4000.0, 'drop the oldest files beyond so many MB in all; 0: keep all', low=0.0
+    )
+    keep_s: float = parameter(0.0, 'drop files older than so many seconds; 0: keep all', low=0.0)
+    queue_mb: float = parameter(64.0, 'messages that may wait for the disk', low=1.0, high=4000.0)
+
+
+class RecorderNode(GraphNode):
+    """Hears raw bytes and passes them on to a writing thread; decodes nothing."""
+
+    def __init__(self, **node_kwargs: Any) -> None:
+        super().__init__('recorder', **node_kwargs)
+        config = self.configure(RecorderConfig)
+        try:
+            self._exclude = re.compile(config.exclude) if config.exclude else None
+        except re.error as error:
+            raise ConfigError(f'exclude = {config.exclude!r}: {error}') from None
+        name = config.folder or f'runs/{time.strftime("%Y%m%d-%H%M%S")}-record'
+        self.folder = Path(name).expanduser()
+        limits = Limits(config.split_mb, config.split_s, config.keep_mb, config.keep_s)
+        self.writer = BackgroundWriter(
+            RecordingFolder(self.folder, limits), int(config.queue_mb * 1e6)
+        )
+        self._began_ns = time.time_ns()
+        self._known: set[str] = set()
+        self.create_timer(_LOOK_EVERY_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.get_logger().info(f'recording into {self.folder}')
+
+    @property
+    def elapsed_s(self) -> float:
+        """Seconds since the recording began."""
+        return 1e-9 * (time.time_ns() - self._began_ns)
+
+    @property
+    def topics(self) -> int:
+        """How many topics are recorded."""
+        return len(self._known)
+
+    def destroy_node(self) -> None:
+        """End the recording, then the node."""
+        self.writer.close()
+        super().destroy_node()
+
+    def _look(self) -> None:
+        """Hear what is new in the graph; tell how the writing goes."""
+        for name, types in self.get_topic_names_and_types():
+            if name not in self._known and not self._left_out(name):
+                self._hear_raw(name, types)
+        self.health.values |= {
+            'folder': str(self.folder),
+            'topics': str(len(self._known)),
+            'messages written': str(self.writer.written),
+            'messages dropped': str(self.writer.dropped),
+        }
+        if self.writer.failure:
+            self.problem('writing', self.writer.failure)
+        elif self.writer.dropped:
+            text = f'the disk is too slow: {self.writer.dropped} messages were dropped'
+            self.problem('writing', text, Level.WARN)
+
+    def _left_out(self, name: str) -> bool:
+        hidden = any(part.startswith('_') for part in name.split('/'))
+        return hidden or bool(self._exclude and self._exclude.search(name))
+
+    def _hear_raw(self, name: str, types: list[str]) -> None:
+        publishers = self.get_publishers_info_by_topic(name)
+        if not publishers:
+            return  # only heard: nobody knows yet how it will be said
+        self._known.add(name)
+        try:
+            if len(types) > 1:
+                raise ConfigError(f'it has several types ({", ".join(types)})')
+            schema_of(types[0])
+            kind = message_class(types[0])
+        except ConfigError as error:
+            self.problem(name, f'{name} is not recorded: {error}', Level.WARN)
+            return
+        offered = [publisher.qos_profile for publisher in publishers]
+        channel = Channel(
+            name, types[0], offered_text(offered), str(publishers[0].topic_type_hash)
+        )
+        # As strict as all the publishers allow, and no stricter: then none is left out.
+        profile = common_profile(
+            reliable=all(p.reliability is ReliabilityPolicy.RELIABLE for p in offered),
+            latched=all(p.durability is DurabilityPolicy.TRANSIENT_LOCAL for p in offered),
+            depth=_DEPTH,
+        )
+        self.create_subscription(
+            kind,
+            name,
+            self._keeper(channel),
+            profile,
+            raw=True,
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+        )
+
+    def _keeper(self, channel: Channel) -> Callable[[bytes, Any], None]:
+        put = self.writer.put
+
+        def keep(data: bytes, info: Any) -> None:
+            # In the order in which things were said, however late we hear of them. A latched
+            # message is older than the recording: it comes first.
+            sent_ns = info['source_timestamp'] or time.time_ns()
+            stamp_ns = max(sent_ns, self._began_ns)
+            put(Sample(channel, data, stamp_ns, sent_ns, info['publication_sequence_number'] or 0))
+
+        return keep
+
+
+def main(args: list[str] | None = None) -> None:
+    """Run the node."""
+    spin_node(RecorderNode, args)
+
+
+if __name__ == '__main__':
+    main()

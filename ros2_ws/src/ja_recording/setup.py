@@ -1,0 +1,26 @@
+from setuptools import find_packages, setup
+
+PACKAGE = 'ja_recording'
+DATA = ('yaml', 'xml', 'obj', 'png', 'jpg', 'npz', 'tflite', 'caffemodel', 'prototxt', 'txt', 'md')
+
+setup(
+    name=PACKAGE,
+    version='0.1.0',
+    description='Recordings of the graph: record, play back, cut into trials, data sets.',
+    license='Apache-2.0',
+    maintainer='The Joint Attention team',
+    maintainer_email='joint-attention@example.org',
+    packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
+    package_data={PACKAGE: [f'**/*.{extension}' for extension in DATA]},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
+        (f'share/{PACKAGE}', ['package.xml']),
+    ],
+    zip_safe=False,
+    entry_points={
+        'console_scripts': [
+            'player = ja_recording.player_node:main',
+            'recorder = ja_recording.recorder_node:main',
+        ],
+    },
+)

@@ -1,0 +1,132 @@
+"""What people see while the graph runs: it listens like any other node, and changes nothing."""
+
+import math
+import time
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from ja_common.core.learning_curve import LearningCurve
+from ja_common.graph_node import GraphNode
+from ja_common.status_values import status_values
+from ja_common.topics import DIAGNOSTICS, GATE_STATUS, SCORE
+
+WINDOW_TRIALS = 100
+EVERY_SCORE = replace(
+    SCORE, hears=QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+)
+"""Latched for those who want the last word; we count the trials and want every one."""
+_SCREEN_EVERY_S = 0.25
+_LINE_EVERY_S = 5.0
+
+
+class ProgressNode(GraphNode):
+    """Collects the success curve, the state of the gate, the rate of images, and complaints."""
+
+    def __init__(self, **node_kwargs: Any) -> None:
+        super().__init__('progress', **node_kwargs)
+        self.curve = LearningCurve()
+        self.gate: Mapping[str, str] = {}
+        self.complaints: dict[str, str] = {}
+        self.images = 0
+        self.objects = 1
+        self.began_s = math.nan
+        self._image_times_s: deque[float] = deque(maxlen=200)
+        self.hear(GATE_STATUS, self._on_gate_status)
+        self.hear(EVERY_SCORE, self._on_score)
+        self.hear(DIAGNOSTICS, self._on_diagnostics)
+
+    @property
+    def elapsed_s(self) -> float:
+        """Wall time since the first image went all the way round; 0 before."""
+        return 0.0 if math.isnan(self.began_s) else time.monotonic() - self.began_s
+
+    @property
+    def images_per_s(self) -> float:
+        """Recent rate of images that went all the way round (the gate answers every one)."""
+        times = self._image_times_s
+        if len(times) < 2 or time.monotonic() - times[-1] > 2.0:
+            return 0.0
+        return (len(times) - 1) / max(times[-1] - times[0], 1e-9)
+
+    def _on_gate_status(self, message: DiagnosticStatus) -> None:
+        now = time.monotonic()
+        if math.isnan(self.began_s):
+            self.began_s = now
+        self.gate = status_values(message)
+        self.images += 1
+        self._image_times_s.append(now)
+
+    def _on_score(self, message: DiagnosticStatus) -> None:
+        values = status_values(message)
+        success = values.get('last') == 'success'
+        self.objects = int(values.get('objects', '1'))
+        self.curve.add(success, float(self.gate.get('p_lm', 'nan')), self.elapsed_s)
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.level == DiagnosticStatus.OK:
+                self.complaints.pop(status.name, None)
+            else:
+                self.complaints[status.name] = status.message
+
+    def facts(self) -> dict[str, str]:
+        """What to show, in this order."""
+        facts = {
+            'trials': str(len(self.curve.records) or self.gate.get('trials', '0')),
+            'stage': self.curve.stage or '-',
+            'success rate, recent': str(self.curve.rate(slice(-WINDOW_TRIALS, None))),
+            'phase': self.gate.get('phase', 'waiting for the first image'),
+            'source': self.gate.get('source', '-'),
+            'p(LM)': self.gate.get('p_lm', '-'),
+            'images/s': f'{self.images_per_s:.0f}',
+            'time': f'{self.elapsed_s:.0f} s',
+        }
+        return facts | dict(sorted(self.complaints.items()))
+
+
+class Display:
+    """A live table on a terminal; a plain line now and then elsewhere."""
+
+    def __init__(self, title: str, console: Console | None = None) -> None:
+        self._title = title
+        self._console = console or Console()
+        self._next_s = 0.0
+        self._live: Live | None = None
+
+    def __enter__(self) -> 'Display':
+        if self._console.is_terminal:
+            self._live = Live(console=self._console, auto_refresh=False, transient=True)
+            self._live.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def say(self, text: str) -> None:
+        """A line that stays."""
+        self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def show(self, node: ProgressNode) -> None:
+        """The state of the run, when it is time to look again."""
+        now = time.monotonic()
+        if now < self._next_s:
+            return
+        facts = node.facts()
+        if self._live is None:
+            self._next_s = now + _LINE_EVERY_S
+            self.say('  '.join(f'{name}: {text}' for name, text in facts.items()))
+            return
+        self._next_s = now + _SCREEN_EVERY_S
+        table = Table(title=self._title, show_header=False, title_justify='left')
+        for name, text in facts.items():
+            table.add_row(name, text)
+        self._live.update(table, refresh=True)

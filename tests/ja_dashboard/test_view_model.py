@@ -1,0 +1,117 @@
+"""What the live page shows, from what the graph says."""
+
+import pytest
+
+from ja_common.core.health import Level
+from ja_dashboard.core.view_model import CurvePoints, Light, Run, ViewModel
+
+
+def gate(phase, source='none', **more):
+    return {'phase': phase, 'source': source, 'p_lm': '0.2500', 'enabled': 'True', **more}
+
+
+def light(level=Level.OK, heard_s=0.0, node='/sim', **values):
+    return Light(node, level, 'fine', heard_s, values)
+
+
+@pytest.fixture
+def model():
+    return ViewModel(now_s=0.0)
+
+
+def test_a_graph_that_stands_still_is_stopped_and_says_for_how_long(model):
+    assert model.state(1.0).run is Run.WAITING
+    assert model.state(60.0).run is Run.STOPPED
+    model.hear_image(1, now_s=60.0)
+    model.hear_gate(gate('shift', 'LM'))
+    state = model.state(61.0)
+    assert (state.run, state.is_live) == (Run.RUNNING, True)
+    assert 'learning module' in state.text
+    model.hear_image(1, now_s=69.0)
+    state = model.state(70.0)
+    assert (state.run, state.is_live) == (Run.STOPPED, False), 'the same image again is no news'
+    assert state.text == 'no new image for 10 s'
+
+
+def test_a_pause_is_told_from_a_stop(model):
+    model.hear_health(light(paused='True'))
+    model.hear_image(1, now_s=0.0)
+    model.hear_image(1, now_s=9.0)
+    assert model.state(10.0).run is Run.PAUSED
+    assert model.switches()['sim/pause'] is True
+    assert model.state(20.0).run is Run.STOPPED, 'a simulation that says nothing is no pause'
+
+
+def test_a_head_that_is_held_says_why(model):
+    model.hear_image(1, now_s=0.0)
+    model.hear_gate(gate('look', reason='disabled'))
+    state = model.state(0.1)
+    assert (state.run, state.text) == (Run.HELD, 'the gate holds the head: disabled')
+
+
+def test_somebody_who_begins_to_look_does_not_see_a_stop(model):
+    model.hear_image(1, now_s=0.0)
+    model.watch(now_s=100.0)
+    assert model.state(100.5).run is Run.RUNNING
+
+
+def trial(model, *shifts, fixated):
+    model.hear_gate(gate('look', 'face'))
+    for source in shifts:
+        model.hear_gate(gate('shift', source))
+    if fixated:
+        model.hear_fixation()
+    model.hear_gate(gate('look'))
+
+
+def test_a_fixation_belongs_to_the_source_of_the_last_shift(model):
+    trial(model, 'VF', 'LM', fixated=True)
+    trial(model, 'LM', 'VF', fixated=True)
+    trial(model, 'LM', fixated=True)
+    trial(model, 'LM', fixated=False)
+    facts = model.facts()
+    assert facts['fixated by LM'] == '50% of 4'
+    assert facts['fixated by VF'] == '25% of 4'
+    assert facts['given up'] == '25% of 4'
+
+
+def test_the_success_rate_comes_with_its_interval(model):
+    model.hear_gate(gate('look'))
+    for success in (True, True, False, False):
+        model.hear_score(success, now_s=1.0)
+    assert model.facts()['success, last 4'] == '0.50 [0.15, 0.85]'
+    points = model.curve_points(now_s=1.0)
+    assert points.trials == [1, 2, 3, 4]
+    assert points.rate == pytest.approx([1.0, 1.0, 2 / 3, 0.5], abs=1e-3)
+    interval = (points.low[-1], points.high[-1])
+    assert interval == pytest.approx(model.curve.rate().interval, abs=1e-3)
+    assert points.p_lm == [0.25] * 4
+
+
+def test_a_long_curve_is_thinned_and_drawn_once_a_second(model):
+    model.hear_gate(gate('look'))
+    for number in range(1001):
+        model.hear_score(number % 2 == 0, now_s=0.0)
+    points = model.curve_points(now_s=0.0)
+    assert len(points.trials) <= 201
+    assert points.trials[-1] == 1001
+    model.hear_score(True, now_s=0.1)
+    assert model.curve_points(now_s=0.5) is points
+    assert model.curve_points(now_s=1.5).trials[-1] == 1002
+    assert CurvePoints.of(model.curve) == model.curve_points(now_s=9.0)
+
+
+def test_a_node_that_falls_silent_goes_stale(model):
+    model.hear_health(light(Level.WARN, 0.0, '/gate'))
+    model.hear_health(light(heard_s=4.0))
+    lights = {shown.node: shown for shown in model.lights(now_s=5.0)}
+    assert lights['/sim'].level is Level.OK
+    assert lights['/gate'].level is Level.STALE
+    assert lights['/gate'].message == 'silent for 5 s'
+
+
+def test_the_log_numbers_its_lines_and_forgets_the_oldest(model):
+    for number in range(300):
+        model.hear_log(f'line {number}')
+    assert len(model.log) == 200
+    assert model.log[-1] == (300, 'line 299')

@@ -1,0 +1,45 @@
+"""What `./ja topics` says of a graph."""
+
+import threading
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from ja_common.topics import DETECTIONS, FIXATION, SUCCESS_RATE
+from ja_diagnostics.topics_table import look_at_topics, table_of_topics
+
+
+def test_a_graph_is_listed_with_rates_and_purposes(ros_context):
+    node = Node('talker', context=ros_context, namespace='/robot')
+    often = node.create_publisher(DETECTIONS.type, DETECTIONS.name, DETECTIONS.says)
+    node.create_publisher(SUCCESS_RATE.type, SUCCESS_RATE.name, SUCCESS_RATE.says)
+    node.create_subscription(DETECTIONS.type, DETECTIONS.name, lambda _: None, DETECTIONS.hears)
+    node.create_subscription(FIXATION.type, FIXATION.name, lambda _: None, FIXATION.hears)
+    node.create_timer(0.02, lambda: often.publish(DETECTIONS.type()))
+    executor = SingleThreadedExecutor(context=ros_context)
+    executor.add_node(node)
+    ended = threading.Event()
+
+    def spin():
+        while not ended.is_set():
+            executor.spin_once(timeout_sec=0.1)
+
+    thread = threading.Thread(target=spin, daemon=True)
+    thread.start()
+    try:
+        rows = {row.name: row for row in look_at_topics(1.0)}
+    finally:
+        ended.set()
+        thread.join()
+        executor.shutdown()
+        node.destroy_node()
+    detections = rows['/robot/detections']
+    assert detections.rate_hz > 0
+    assert (detections.type, detections.quality) == ('sensor_msgs/PointCloud2', 'reliable')
+    assert detections.publishers == detections.subscribers == ['talker']
+    assert detections.purpose == DETECTIONS.purpose
+    success = rows['/robot/sim/success_rate']
+    assert (success.quality, success.rate_hz) == ('reliable, latched', 0.0)
+    assert success.subscribers == []
+    assert '/robot/fixation' not in rows, 'nobody says it'
+    assert table_of_topics(list(rows.values())).row_count == len(rows)

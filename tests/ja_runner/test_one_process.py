@@ -1,0 +1,61 @@
+"""All nodes on one executor, in this process."""
+
+import os
+import signal
+
+import pytest
+from rclpy.context import Context
+from rclpy.node import Node
+from std_msgs.msg import String
+
+from ja_runner.graph import NodeSpec
+from ja_runner.one_process import run_in_one_process
+
+pytestmark = pytest.mark.usefixtures('domain')
+
+
+class Listener(Node):
+    heard: list[str] = []  # noqa: RUF012 (one listener a test, reset by `listener`)
+
+    def __init__(self, context: Context) -> None:
+        super().__init__('listener', context=context)
+        self.create_subscription(String, '/ship/chatter', self._on_chatter, 10)
+
+    def _on_chatter(self, message: String) -> None:
+        self.heard.append(message.data)
+
+
+@pytest.fixture
+def listener() -> type[Listener]:
+    Listener.heard = []
+    return Listener
+
+
+GRAPH = [
+    NodeSpec('dummy_nodes', 'talker', {'text': text}, {'__ns': '/ship', '__node': text})
+    for text in ('ann', 'ben')
+]
+
+
+def test_nodes_keep_their_own_names_and_parameters(listener):
+    both = {'ann from /ship/ann', 'ben from /ship/ben'}
+    assert run_in_one_process(GRAPH, listener, lambda: both <= set(listener.heard)) == 0
+
+
+def test_a_signal_ends_it_cleanly(listener):
+    before = signal.getsignal(signal.SIGTERM)
+
+    def kill_when_running() -> bool:
+        if listener.heard:
+            os.kill(os.getpid(), signal.SIGTERM)
+        return False
+
+    assert run_in_one_process(GRAPH, listener, kill_when_running) == 0
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_a_bad_parameter_gives_one_sentence(listener):
+    said: list[str] = []
+    bad = NodeSpec('dummy_nodes', 'talker', {'text': 'bad'})
+    assert run_in_one_process([*GRAPH, bad], listener, lambda: False, said.append) == 1
+    assert said == ['error: talker: parameter text = bad cannot be used']

@@ -1,0 +1,60 @@
+"""The watcher hears a graph, and tells people."""
+
+import io
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rich.console import Console
+
+from ja_common.topics import DIAGNOSTICS, GATE_STATUS, SCORE
+from ja_runner.progress import Display, ProgressNode
+
+
+def status(level: bytes = DiagnosticStatus.OK, name: str = '', text: str = '', **values: str):
+    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
+    return DiagnosticStatus(level=level, name=name, message=text, values=pairs)
+
+
+def test_it_counts_trials_and_keeps_the_gates_state(make_bench):
+    bench = make_bench(ProgressNode, says=[GATE_STATUS, SCORE])
+    assert bench.node.elapsed_s == 0
+    bench.say(GATE_STATUS, status(phase='shift', source='LM', p_lm='0.25', trials='7'))
+    bench.wait(lambda: bench.node.images == 1)
+    for last in ('success', 'failure', 'given up'):
+        bench.say(SCORE, status(last=last, objects='3'))
+    bench.wait(lambda: len(bench.node.curve.records) == 3)
+    assert [record.success for record in bench.node.curve.records] == [True, False, False]
+    assert {record.p_lm for record in bench.node.curve.records} == {0.25}
+    facts = bench.node.facts()
+    assert facts['trials'] == '3'
+    assert facts['phase'] == 'shift'
+    assert facts['success rate, recent'].startswith('0.33 [')
+    assert bench.node.elapsed_s > 0
+
+
+def test_a_complaint_is_shown_until_it_is_over(make_bench):
+    bench = make_bench(ProgressNode, says=[DIAGNOSTICS])
+    bench.say(DIAGNOSTICS, DiagnosticArray(status=[status(DiagnosticStatus.WARN, '/gate', 'no')]))
+    bench.wait(lambda: bench.node.facts().get('/gate') == 'no')
+    bench.say(DIAGNOSTICS, DiagnosticArray(status=[status(DiagnosticStatus.OK, '/gate')]))
+    bench.wait(lambda: '/gate' not in bench.node.facts())
+
+
+def test_without_a_terminal_a_plain_line_is_printed(make_bench):
+    node = make_bench(ProgressNode).node
+    text = io.StringIO()
+    with Display('title', Console(file=text)) as display:
+        display.show(node)
+        display.show(node)
+        display.say('[ERROR] [gate]: [not markup]')
+    first, second = text.getvalue().splitlines()
+    assert first.startswith('trials: 0')
+    assert second == '[ERROR] [gate]: [not markup]'
+
+
+def test_on_a_terminal_a_table_lives(make_bench):
+    node = make_bench(ProgressNode).node
+    text = io.StringIO()
+    with Display('the title', Console(file=text, force_terminal=True, width=90)) as display:
+        display.show(node)
+    assert 'the title' in text.getvalue()
+    assert 'waiting for the first image' in text.getvalue()
