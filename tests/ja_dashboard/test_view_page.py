@@ -18,7 +18,6 @@ from ja_dashboard.image_feed import Picture
 from ja_dashboard.page import PICTURE_URL, Page, facts_html, nodes_html
 from ja_dashboard.server import picture_app
 from ja_dashboard.view_node import Frame
-from ja_perception.core.detector import Percept
 
 SERVICES = frozenset({'enable', 'home', 'reset_learning', 'sim/pause', 'sim/step'})
 
@@ -142,9 +141,8 @@ def get_picture(robot: Robot) -> httpx.Response:
 
 def test_the_picture_is_the_newest_one_as_jpeg():
     face = Detection(Kind.FACE, 0.0, 0.0, 160.0, 120.0, 60.0, 80.0, 0.9)
-    percept = Percept([face], None, None, True, 0.0)
     camera = CameraModel.from_field_of_view(320, 240, 0.6)
-    picture = Picture(1, np.full((240, 320, 3), 60, np.uint8), percept, camera, 0.004)
+    picture = Picture(1, np.full((240, 320, 3), 60, np.uint8), [face], None, camera, 0.004)
     answer = get_picture(Robot(picture=picture))
     assert answer.headers['content-type'] == 'image/jpeg'
     drawn = cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_COLOR)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ja_experiments import looks as looks_module
+from ja_experiments.datasets import looks as looks_module
 from ja_experiments.datasets.looks import Looks, load_looks
 
 

@@ -9,9 +9,9 @@ import pytest
 import yaml
 
 from ja_common.core.statistics import over_seeds
-from ja_experiments import study as study_module
 from ja_experiments.config import reading
 from ja_experiments.datasets.looks import Looks
+from ja_experiments.paper import study as study_module
 from ja_experiments.paper.experiment import BLOCKS, Materials, Plan, run_conditions
 from ja_experiments.paper.report import write_report
 from ja_experiments.paper.study import StudyConfig, read_ablations, run_study

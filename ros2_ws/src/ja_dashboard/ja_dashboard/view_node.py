@@ -28,10 +28,9 @@ from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.parameters import choices_of
 from ja_common.polled_subscription import Mailbox
 from ja_common.status_values import status_values
-from ja_common.topics import DIAGNOSTICS, FIXATION, GATE_STATUS, LOG, Topic
+from ja_common.topics import DIAGNOSTICS, EVERY_SCORE, FIXATION, GATE_STATUS, LOG, Topic
 from ja_dashboard.core.view_model import CurvePoints, Glance, Light, State, ViewModel
 from ja_dashboard.image_feed import ALL_OF_ONE_LOOK, LIMITS, Picture, Sight
-from ja_runner.progress import EVERY_SCORE
 
 LOOK_EVERY_S = 0.1
 _ASK_EVERY_S = 2.0

@@ -4,11 +4,9 @@ import math
 import time
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rich.console import Console
 from rich.live import Live
 from rich.table import Table
@@ -16,13 +14,9 @@ from rich.table import Table
 from ja_common.core.learning_curve import LearningCurve
 from ja_common.graph_node import GraphNode
 from ja_common.status_values import status_values
-from ja_common.topics import DIAGNOSTICS, GATE_STATUS, SCORE
+from ja_common.topics import DIAGNOSTICS, EVERY_SCORE, GATE_STATUS
 
 WINDOW_TRIALS = 100
-EVERY_SCORE = replace(
-    SCORE, hears=QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-)
-"""Latched for those who want the last word; we count the trials and want every one."""
 _SCREEN_EVERY_S = 0.25
 _LINE_EVERY_S = 5.0
 

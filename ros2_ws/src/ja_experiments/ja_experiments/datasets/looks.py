@@ -154,8 +154,9 @@ def _sources() -> Iterator[bytes]:
             if path.parent != root:
                 yield path.relative_to(root).as_posix().encode()
                 yield path.read_bytes()
-    for name in ('looks.py', 'rendered.py', 'robot.py'):
-        yield Path(__file__).with_name(name).read_bytes()
+    root = Path(str(resources.files('ja_experiments')))
+    for name in ('datasets/looks.py', 'datasets/rendered.py', 'agents/robot.py'):
+        yield (root / name).read_bytes()
 
 
 def _sha256(chunks: Iterator[bytes] | list[bytes]) -> str:
