@@ -26,8 +26,8 @@ class NodeBench:
         self,
         context: Context,
         make_node: Callable[..., Node],
-        says: Sequence[Topic] = (),
-        hears: Sequence[Topic] = (),
+        publishes: Sequence[Topic] = (),
+        subscribes: Sequence[Topic] = (),
         **parameters: Any,
     ) -> None:
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
@@ -38,13 +38,13 @@ class NodeBench:
         self.executor.add_node(self.peer)
         self._heard: dict[str, list] = defaultdict(list)
         self._publishers = {
-            topic.name: self.peer.create_publisher(topic.type, topic.name, topic.says)
-            for topic in says
+            topic.name: self.peer.create_publisher(topic.type, topic.name, topic.publisher_qos)
+            for topic in publishes
         }
-        for topic in hears:
+        for topic in subscribes:
             keep = self._heard[topic.name].append
-            self.peer.create_subscription(topic.type, topic.name, keep, topic.hears)
-        ours = {f'/{topic.name}'.replace('//', '/') for topic in hears}
+            self.peer.create_subscription(topic.type, topic.name, keep, topic.subscriber_qos)
+        ours = {f'/{topic.name}'.replace('//', '/') for topic in subscribes}
         answering = [p for p in self.node.publishers if p.topic_name in ours]
         speakers = [*self._publishers.values(), *answering]
         self.wait(lambda: all(p.get_subscription_count() for p in speakers))
@@ -64,31 +64,33 @@ class NodeBench:
         """Spin until the condition holds."""
         spin_until(self.executor, condition)
 
-    def say(self, topic: Topic, message: Any) -> None:
+    def publish(self, topic: Topic, message: Any) -> None:
         """The peer publishes."""
         self._publishers[topic.name].publish(message)
 
-    def say_posture(self, stamp_ns: int, pan: float = 0.0, tilt: float = 0.0, **more: Any) -> None:
+    def publish_posture(
+        self, stamp_ns: int, pan: float = 0.0, tilt: float = 0.0, **more: Any
+    ) -> None:
         """The rig publishes a joint state; the head stands still unless `velocity` is given."""
         message = joint_state(stamp_ns, pan, tilt)
         message.velocity = [0.0, 0.0]
         for name, value in more.items():
             setattr(message, name, value)
-        self.say(JOINT_STATES, message)
+        self.publish(JOINT_STATES, message)
 
-    def heard(self, topic: Topic) -> list:
+    def messages(self, topic: Topic) -> list:
         """All that the peer has heard on a topic."""
         return self._heard[topic.name]
 
     def next(self, topic: Topic, count: int = 1) -> Any:
         """Wait for `count` more messages on a topic; the last of them."""
-        wanted = len(self.heard(topic)) + count
-        self.wait(lambda: len(self.heard(topic)) >= wanted)
-        return self.heard(topic)[wanted - 1]
+        wanted = len(self.messages(topic)) + count
+        self.wait(lambda: len(self.messages(topic)) >= wanted)
+        return self.messages(topic)[wanted - 1]
 
     def received(self, topic: Topic) -> int:
         """How many messages the node under test has taken from a topic."""
-        (name,) = [name for name, heard in self.node.heard_topics.items() if heard is topic]
+        (name,) = [name for name, heard in self.node.subscribed_topics.items() if heard is topic]
         return int(self.node.health.report(time.monotonic()).values[f'{name} received'])
 
     def call(self, service_type: Any, name: str, **fields: Any) -> Any:

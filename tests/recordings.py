@@ -31,4 +31,6 @@ def channel_of(topic: Topic) -> Channel:
     """How a recorder would name the topic."""
     package = topic.type.__module__.split('.')[0]
     name = f'/{topic.name.lstrip("/")}'
-    return Channel(name, f'{package}/msg/{topic.type.__name__}', offered_text([topic.says]))
+    return Channel(
+        name, f'{package}/msg/{topic.type.__name__}', offered_text([topic.publisher_qos])
+    )

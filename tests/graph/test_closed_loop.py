@@ -1,4 +1,4 @@
-"""Camera, Eq. 2, border and a hobby servo in one loop, with 60 ms from exposure to picture.
+"""Camera, Eq. 2, guard and a hobby servo in one loop, with 60 ms from exposure to picture.
 
 The cores alone, in simulated time: what is seen is the exact ray to one target, so that the loop
 is judged and not the detector.
@@ -12,7 +12,7 @@ import pytest
 
 from ja_common.core.geometry import rays_of_directions
 from ja_common.core.posture import PostureHistory
-from ja_control.core.border import Border, BorderConfig
+from ja_control.core.command_guard import CommandGuard, CommandGuardConfig
 from ja_control.core.joint_limits import JointLimitsConfig
 from ja_control.core.visual_feedback import visual_feedback
 from ja_sim.core.head import PanTiltHead
@@ -25,7 +25,7 @@ CONTROL_S, CAMERA_TICKS, DELAY_S = 0.01, 3, 0.06
 def pursue(target, seconds, spec=HEAD_PRESETS['hobby_servo']):
     """Drive the head at target(t) (2,) [rad]; times (N,) and true postures (N, 2)."""
     head, history = PanTiltHead(spec), PostureHistory()
-    border = Border(JointLimitsConfig(), BorderConfig(), CONTROL_S)
+    guard = CommandGuard(JointLimitsConfig(), CommandGuardConfig(), CONTROL_S)
     rng = np.random.default_rng(0)
     pictures: deque = deque()
     times, postures = [], []
@@ -34,16 +34,16 @@ def pursue(target, seconds, spec=HEAD_PRESETS['hobby_servo']):
         head.advance_to(now_s)
         sample = head.read_encoders(round(now_s * 1e9), rng)
         history.add(sample.stamp_ns, sample.position, sample.velocity)
-        border.hear_joints(sample.position, now_s, 0.0)
+        guard.hear_joints(sample.position, now_s, 0.0)
         if tick % CAMERA_TICKS == 0:
             ray = rays_of_directions(head.posture, np.asarray(target(now_s)))
             pictures.append((now_s, sample.stamp_ns, ray))
         while pictures and pictures[0][0] <= now_s - DELAY_S + 1e-9:
             taken_s, stamp_ns, ray = pictures.popleft()
-            border.hear_image(now_s, now_s - taken_s)
-            if border.engaged:
-                border.aim(history.at(stamp_ns).position + visual_feedback(ray, gain=1.0))
-        command = border.step(now_s)
+            guard.hear_image(now_s, now_s - taken_s)
+            if guard.engaged:
+                guard.aim(history.at(stamp_ns).position + visual_feedback(ray, gain=1.0))
+        command = guard.step(now_s)
         if command.position is not None:
             assert command.hold is None
             head.command(command.position)

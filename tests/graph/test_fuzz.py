@@ -70,8 +70,8 @@ def test_node_outlives_whatever_it_hears(thing, ros_context):
     peer.add_node(node)
     peer.add_node(speaker)
     publishers = {
-        name: (topic, speaker.create_publisher(topic.type, name, topic.says))
-        for name, topic in node.heard_topics.items()
+        name: (topic, speaker.create_publisher(topic.type, name, topic.publisher_qos))
+        for name, topic in node.subscribed_topics.items()
     }
     spin_until(peer, lambda: all(p.get_subscription_count() for _, p in publishers.values()))
     sizes = []
@@ -83,7 +83,7 @@ def test_node_outlives_whatever_it_hears(thing, ros_context):
             for _ in range(2 * len(publishers)):
                 peer.spin_once(timeout_sec=0.0)
         sizes.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
-    for name, service in node.offered_services.items():
+    for name, service in node.advertised_services.items():
         client = speaker.create_client(service, name)
         spin_until(peer, client.service_is_ready)
         requests = [service.Request(data=flag) for flag in (True, False)] if (

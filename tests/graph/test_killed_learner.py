@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.node import Node
 
-from ja_common.executor import KeptWaitSetExecutor
+from ja_common.executor import CachedWaitSetExecutor
 from ja_common.topics import DIAGNOSTICS
 from ja_runner.graph import NodeSpec, sim_graph
 from ja_runner.supervisor import Supervisor
@@ -31,7 +31,9 @@ class Witness(Node):
     def __init__(self, context: Context) -> None:
         super().__init__('witness', context=context)
         self.learned: int | None = None
-        self.create_subscription(DiagnosticArray, DIAGNOSTICS.name, self._hear, DIAGNOSTICS.hears)
+        self.create_subscription(
+            DiagnosticArray, DIAGNOSTICS.name, self._hear, DIAGNOSTICS.subscriber_qos
+        )
 
     def _hear(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -55,7 +57,7 @@ def graph(folder: Path) -> list[NodeSpec]:
 def test_a_killed_learner_loses_few_trials_and_learns_on(tmp_path):
     context = Context()
     rclpy.init(args=[], context=context)
-    executor = KeptWaitSetExecutor(context=context)
+    executor = CachedWaitSetExecutor(context=context)
     witness = Witness(context)
     executor.add_node(witness)
     supervisor = Supervisor(graph(tmp_path / 'kept'), tmp_path / 'log', 'restart', print)

@@ -13,7 +13,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from ja_common.executor import KeptWaitSetExecutor
+from ja_common.executor import CachedWaitSetExecutor
 from ja_common.time_codec import to_ns
 from ja_common.topics import DETECTIONS, IMAGE, JOINT_COMMANDS, LM_DELTA
 from ja_runner.graph import NodeSpec, sim_graph
@@ -84,7 +84,7 @@ def run_in_one(draw_ahead: bool) -> Witness:
 def run_in_many(folder: Path, draw_ahead: bool) -> Witness:
     context = Context()
     rclpy.init(args=[], context=context)
-    executor = KeptWaitSetExecutor(context=context)
+    executor = CachedWaitSetExecutor(context=context)
     witness = Witness(context)
     executor.add_node(witness)
 

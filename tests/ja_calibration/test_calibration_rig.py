@@ -17,26 +17,29 @@ START = (0.3, -0.1)
 @pytest.fixture
 def bench(make_bench: Callable[..., NodeBench]) -> NodeBench:
     return make_bench(
-        CalibrationRig, says=[JOINT_STATES, IMAGE], hears=[JOINT_COMMANDS], stall_error_rad=3.0
+        CalibrationRig,
+        publishes=[JOINT_STATES, IMAGE],
+        subscribes=[JOINT_COMMANDS],
+        stall_error_rad=3.0,
     )
 
 
 def say_now(bench: NodeBench) -> None:
     stamp_ns = bench.peer.get_clock().now().nanoseconds
-    bench.say(IMAGE, encode_image(BLANK, bench.peer.get_clock().now().to_msg(), 'eye'))
-    bench.say_posture(stamp_ns, *START)
+    bench.publish(IMAGE, encode_image(BLANK, bench.peer.get_clock().now().to_msg(), 'eye'))
+    bench.publish_posture(stamp_ns, *START)
 
 
 def commands(bench: NodeBench, count: int) -> np.ndarray:
     """So many more commands of a head that is seen meanwhile, (count, 2) [rad]."""
-    before = len(bench.heard(JOINT_COMMANDS))
+    before = len(bench.messages(JOINT_COMMANDS))
 
     def enough() -> bool:
         say_now(bench)
-        return len(bench.heard(JOINT_COMMANDS)) >= before + count
+        return len(bench.messages(JOINT_COMMANDS)) >= before + count
 
     bench.wait(enough)
-    return np.array([list(m.position) for m in bench.heard(JOINT_COMMANDS)[before:]])
+    return np.array([list(m.position) for m in bench.messages(JOINT_COMMANDS)[before:]])
 
 
 def test_begins_where_the_head_stands_and_turns_gently(bench: NodeBench) -> None:
@@ -58,8 +61,10 @@ def test_stopped_it_brakes_and_holds(bench: NodeBench) -> None:
 
 
 def test_two_do_not_lead_one_head(make_bench: Callable[..., NodeBench]) -> None:
-    bench = make_bench(CalibrationRig, says=[JOINT_STATES, IMAGE])
-    bench.peer.create_publisher(JOINT_COMMANDS.type, JOINT_COMMANDS.name, JOINT_COMMANDS.says)
+    bench = make_bench(CalibrationRig, publishes=[JOINT_STATES, IMAGE])
+    bench.peer.create_publisher(
+        JOINT_COMMANDS.type, JOINT_COMMANDS.name, JOINT_COMMANDS.publisher_qos
+    )
     bench.wait(lambda: bench.node.count_publishers(JOINT_COMMANDS.name) == 2)
 
     def listen_and_speak() -> bool:
@@ -71,7 +76,7 @@ def test_two_do_not_lead_one_head(make_bench: Callable[..., NodeBench]) -> None:
 
 
 def test_a_start_near_the_limits_is_refused(make_bench: Callable[..., NodeBench]) -> None:
-    bench = make_bench(CalibrationRig, says=[JOINT_STATES, IMAGE], pan_max_rad=0.35)
+    bench = make_bench(CalibrationRig, publishes=[JOINT_STATES, IMAGE], pan_max_rad=0.35)
 
     def listen_and_speak() -> bool:
         say_now(bench)

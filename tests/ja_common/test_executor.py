@@ -10,13 +10,13 @@ from rclpy.node import Node
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
-from ja_common.executor import KeptWaitSetExecutor
+from ja_common.executor import CachedWaitSetExecutor
 from ros_testing import spin_until
 
 
 @pytest.fixture
-def executor(ros_context: Context) -> Iterator[KeptWaitSetExecutor]:
-    executor = KeptWaitSetExecutor(context=ros_context)
+def executor(ros_context: Context) -> Iterator[CachedWaitSetExecutor]:
+    executor = CachedWaitSetExecutor(context=ros_context)
     yield executor
     nodes = executor.get_nodes()
     executor.shutdown()
@@ -25,7 +25,7 @@ def executor(ros_context: Context) -> Iterator[KeptWaitSetExecutor]:
 
 
 @pytest.fixture
-def node(executor: KeptWaitSetExecutor, ros_context: Context) -> Node:
+def node(executor: CachedWaitSetExecutor, ros_context: Context) -> Node:
     node = rclpy.create_node('node', context=ros_context)
     executor.add_node(node)
     return node

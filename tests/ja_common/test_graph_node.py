@@ -25,8 +25,10 @@ class Listener(GraphNode):
     def __init__(self, **node_kwargs):
         super().__init__('listener', **node_kwargs)
         self.got = []
-        self.hear(FIXATION, self._on_fixation, expected_every_s=0.05)
-        self.offer(Trigger, 'do', lambda request, response: self.on_call(request, response))
+        self.subscribe(FIXATION, self._on_fixation, expected_every_s=0.05)
+        self.advertise_service(
+            Trigger, 'do', lambda request, response: self.on_call(request, response)
+        )
 
     def _on_fixation(self, message):
         self.on_fixation(message)
@@ -35,7 +37,7 @@ class Listener(GraphNode):
 
 @pytest.fixture
 def bench(make_bench):
-    return make_bench(Listener, says=[FIXATION], hears=[DIAGNOSTICS])
+    return make_bench(Listener, publishes=[FIXATION], subscribes=[DIAGNOSTICS])
 
 
 def fail(error):
@@ -56,20 +58,20 @@ def fail(error):
 def test_node_outlives_bad_input_and_says_it_once(bench, capfd, error, text):
     bench.node.on_fixation = fail(error)
     for stamp_ns in (1, 2, 3):
-        bench.say(FIXATION, joint_state(stamp_ns))
+        bench.publish(FIXATION, joint_state(stamp_ns))
     bench.wait(lambda: bench.received(FIXATION) == 3)
     assert text in bench.complaint()
     log = capfd.readouterr().err
     assert log.count(text) == 1
     assert ('Traceback' in log) == isinstance(error, KeyError), 'only for a fault of our own'
     bench.node.on_fixation = lambda message: None
-    bench.say(FIXATION, joint_state(4))
+    bench.publish(FIXATION, joint_state(4))
     bench.wait(lambda: bench.node.got)
 
 
 def test_diagnostics_tell_name_level_and_figures_at_one_hertz(bench):
     bench.node.on_fixation = fail(ValueError('the ray is bent'))
-    bench.say(FIXATION, joint_state(1))
+    bench.publish(FIXATION, joint_state(1))
     bench.wait(lambda: bench.complaint() != 'OK')
     (status,) = bench.next(DIAGNOSTICS).status
     assert status.name == '/listener'
@@ -79,7 +81,7 @@ def test_diagnostics_tell_name_level_and_figures_at_one_hertz(bench):
 
 
 def test_silence_is_explained_by_the_quality_of_service(make_bench):
-    bench = make_bench(Listener, hears=[DIAGNOSTICS])
+    bench = make_bench(Listener, subscribes=[DIAGNOSTICS])
     bench.wait_for_complaint('no message on /fixation for more than 0.15 s: nobody publishes it')
     lossy = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     bench.peer.create_publisher(FIXATION.type, FIXATION.name, lossy)
@@ -91,11 +93,11 @@ def test_silence_is_explained_by_the_quality_of_service(make_bench):
 
 def test_silence_of_a_publisher_that_says_nothing_and_its_end(bench):
     bench.wait_for_complaint('peer is its publisher, but says nothing')
-    reports = len(bench.heard(DIAGNOSTICS))
+    reports = len(bench.messages(DIAGNOSTICS))
 
     def speaking_helps():
-        bench.say(FIXATION, joint_state(1))
-        said = [d.status[0].message for d in bench.heard(DIAGNOSTICS)[reports:]]
+        bench.publish(FIXATION, joint_state(1))
+        said = [d.status[0].message for d in bench.messages(DIAGNOSTICS)[reports:]]
         return any('says nothing' not in message for message in said)
 
     bench.wait(speaking_helps)
@@ -123,15 +125,15 @@ def test_sensor_of_any_reliability_is_heard(make_bench):
         def __init__(self, **node_kwargs):
             super().__init__('sensing', **node_kwargs)
             self.got = set()
-            self.hear(IMAGE, lambda message: self.got.add('image'))
-            self.hear(JOINT_STATES, lambda message: self.got.add('joints'))
+            self.subscribe(IMAGE, lambda message: self.got.add('image'))
+            self.subscribe(JOINT_STATES, lambda message: self.got.add('joints'))
 
-    bench = make_bench(Sensing, says=[IMAGE])
+    bench = make_bench(Sensing, publishes=[IMAGE])
     lossy = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     joints = bench.peer.create_publisher(JOINT_STATES.type, JOINT_STATES.name, lossy)
 
     def heard_both():
-        bench.say(IMAGE, IMAGE.type())
+        bench.publish(IMAGE, IMAGE.type())
         joints.publish(joint_state(1))
         return bench.node.got == {'image', 'joints'}
 

@@ -7,7 +7,7 @@ def test_healthy_node_says_ok_and_how_much_it_hears():
     health = Health(now_s=100.0)
     health.expect('/image', every_s=1.0)
     for i in range(20):
-        health.heard('/image', 100.0 + i / 10)
+        health.record_message('/image', 100.0 + i / 10)
     health.values['trials'] = '7'
     report = health.report(102.0)
     assert (report.level, report.message) == (Level.OK, 'OK')
@@ -23,7 +23,7 @@ def test_silence_is_noticed_after_the_last_message_and_later_before_the_first():
     health.expect('/sometimes', every_s=None)
     assert health.silent(2.9) == {}, 'others may still be starting'
     assert health.silent(3.1) == {'/image': 3.0}
-    health.heard('/image', 3.2)
+    health.record_message('/image', 3.2)
     assert health.silent(4.1) == {}
     assert health.silent(4.3) == {'/image': 1.0}
 

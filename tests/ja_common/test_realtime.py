@@ -10,7 +10,7 @@ import pytest
 PROGRAM = """
 import json, os
 from concurrent.futures import ThreadPoolExecutor
-from ja_common.realtime import go_as_any_program, go_back_among_all, go_before_all_else
+from ja_common.realtime import use_default_scheduling, go_back_among_all, enable_realtime_scheduling
 
 def policy():
     return os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
@@ -18,11 +18,11 @@ def policy():
 old = ThreadPoolExecutor(1)
 old.submit(policy).result()
 try:
-    go_before_all_else(7)
+    enable_realtime_scheduling(7)
 except PermissionError as error:
     print(json.dumps(str(error)))
 else:
-    urgent, calm = ThreadPoolExecutor(1), ThreadPoolExecutor(1, initializer=go_as_any_program)
+    urgent, calm = ThreadPoolExecutor(1), ThreadPoolExecutor(1, initializer=use_default_scheduling)
     pools = old, urgent, calm
     said = [policy(), *(pool.submit(policy).result() for pool in pools)]
     go_back_among_all()

@@ -23,17 +23,17 @@ def test_names_are_relative_so_that_namespaces_work(topic):
 
 @by_name
 def test_who_hears_matches_who_says(topic):
-    compatibility, reason = qos_check_compatible(topic.says, topic.hears)
+    compatibility, reason = qos_check_compatible(topic.publisher_qos, topic.subscriber_qos)
     assert compatibility is not QoSCompatibility.ERROR, reason
-    assert topic.hears.history is HistoryPolicy.KEEP_LAST
+    assert topic.subscriber_qos.history is HistoryPolicy.KEEP_LAST
 
 
 @pytest.mark.parametrize('topic', [IMAGE, JOINT_STATES], ids=lambda topic: topic.name)
 @pytest.mark.parametrize('driver', [best_effort_camera, reliable_camera])
 def test_any_driver_is_heard(topic, driver):
-    assert qos_check_compatible(driver, topic.hears)[0] is not QoSCompatibility.ERROR
+    assert qos_check_compatible(driver, topic.subscriber_qos)[0] is not QoSCompatibility.ERROR
 
 
 def test_only_the_newest_image_waits():
-    assert IMAGE.hears.depth == 1
-    assert IMAGE.hears.reliability is ReliabilityPolicy.BEST_EFFORT
+    assert IMAGE.subscriber_qos.depth == 1
+    assert IMAGE.subscriber_qos.reliability is ReliabilityPolicy.BEST_EFFORT

@@ -52,16 +52,16 @@ class Graph:
         """All topics of one image; those not in `proposals` have nothing to say."""
         stamp_ns = self.stamp_ns if stamp_ns is None else stamp_ns
         evidence = {'log_evidence': [log_evidence]}
-        self.bench.say(EVIDENCE, encode_columns(header(stamp_ns), evidence))
+        self.bench.publish(EVIDENCE, encode_columns(header(stamp_ns), evidence))
         for topic in PROPOSALS:
             if topic not in without:
-                self.bench.say(topic, joint_state(stamp_ns, *proposals.get(topic, ())))
+                self.bench.publish(topic, joint_state(stamp_ns, *proposals.get(topic, ())))
 
     def image(self, proposals=FACE_RIGHT, age_s=0.0, follow=True):
         """The next image; the command that answers it, which the head obeys at once."""
         self.stamp_ns += PERIOD_NS
         self.set_clock(self.stamp_ns + int(age_s * 1e9))
-        self.bench.say_posture(self.stamp_ns, self.pan)
+        self.bench.publish_posture(self.stamp_ns, self.pan)
         self.tell(proposals)
         command = self.answer()
         if follow:
@@ -71,7 +71,7 @@ class Graph:
     def answer(self):
         """The command that carries the header of the last image."""
         asked = header(self.stamp_ns)
-        heard = self.bench.heard(JOINT_COMMANDS)
+        heard = self.bench.messages(JOINT_COMMANDS)
         self.bench.wait(lambda: any(command.header == asked for command in heard))
         return next(command for command in reversed(heard) if command.header == asked)
 
@@ -80,14 +80,14 @@ class Graph:
         clock = self.bench.node.get_clock()
 
         def set_and_seen():
-            self.bench.say(CLOCK, Clock(clock=to_time(now_ns)))
+            self.bench.publish(CLOCK, Clock(clock=to_time(now_ns)))
             return clock.now().nanoseconds == now_ns
 
         self.bench.wait(set_and_seen)
 
     def status(self):
         """The status that goes with the last command."""
-        heard = self.bench.heard
+        heard = self.bench.messages
         self.bench.wait(lambda: len(heard(GATE_STATUS)) >= len(heard(JOINT_COMMANDS)))
         status = heard(GATE_STATUS)[-1]
         return status, {value.key: value.value for value in status.values}
@@ -118,7 +118,7 @@ def test_complete_set_is_answered_by_one_command_with_the_stamp_of_the_image(gra
     second = graph.image()
     assert to_ns(second.header.stamp) == graph.stamp_ns
     assert second.position[0] == pytest.approx(-SPEED * PERIOD_NS / 1e9), 'at limited speed'
-    assert len(graph.bench.heard(JOINT_COMMANDS)) == 2
+    assert len(graph.bench.messages(JOINT_COMMANDS)) == 2
 
 
 def test_status_tells_phase_source_and_what_was_cut(graph):
@@ -135,11 +135,11 @@ def test_status_tells_phase_source_and_what_was_cut(graph):
 def test_incomplete_set_is_not_answered(graph):
     graph.image()
     graph.stamp_ns += PERIOD_NS
-    graph.bench.say_posture(graph.stamp_ns)
+    graph.bench.publish_posture(graph.stamp_ns)
     graph.tell(FACE_RIGHT, without=[LM_DELTA])
     graph.bench.wait(lambda: graph.bench.received(FIXATION) == 2)
-    assert len(graph.bench.heard(JOINT_COMMANDS)) == 1
-    graph.bench.say(LM_DELTA, joint_state(graph.stamp_ns))
+    assert len(graph.bench.messages(JOINT_COMMANDS)) == 1
+    graph.bench.publish(LM_DELTA, joint_state(graph.stamp_ns))
     graph.bench.next(JOINT_COMMANDS)
 
 
@@ -173,7 +173,7 @@ def test_late_image_is_not_answered(graph):
     graph.tell(FACE_RIGHT, stamp_ns=graph.stamp_ns - PERIOD_NS)
     answer = graph.image()
     assert to_ns(answer.header.stamp) == graph.stamp_ns
-    assert len(graph.bench.heard(JOINT_COMMANDS)) == 3
+    assert len(graph.bench.messages(JOINT_COMMANDS)) == 3
 
 
 def test_clock_set_back_starts_again_from_where_the_head_stands(graph):
@@ -255,14 +255,14 @@ def test_broken_proposal_is_one_clear_error_and_not_a_command(graph, message, te
     graph.stamp_ns += PERIOD_NS
     graph.tell({}, without=[VF_DELTA])
     message.header = header(graph.stamp_ns)
-    graph.bench.say(VF_DELTA, message)
+    graph.bench.publish(VF_DELTA, message)
     graph.bench.wait_for_complaint(f'/visual_feedback/delta: {text}')
     graph.image()
-    assert len(graph.bench.heard(JOINT_COMMANDS)) == 2
+    assert len(graph.bench.messages(JOINT_COMMANDS)) == 2
 
 
 def test_unknown_joint_is_named(graph):
-    graph.bench.say_posture(graph.stamp_ns, name=['neck', 'tilt'])
+    graph.bench.publish_posture(graph.stamp_ns, name=['neck', 'tilt'])
     graph.bench.wait_for_complaint("/joint_states: no joint ['pan'] in the message; it names")
     graph.image()
 
@@ -296,7 +296,7 @@ def test_not_finite_proposals_of_every_kind_move_nothing(graph):
         graph.tell({topic: (math.inf, math.nan)})
         graph.bench.wait_for_complaint(f'/{topic.name}: position of')
     graph.image({})
-    assert len(graph.bench.heard(JOINT_COMMANDS)) == 2
+    assert len(graph.bench.messages(JOINT_COMMANDS)) == 2
 
 
 def test_count_of_trials_outlives_the_gate(make_graph, tmp_path):
@@ -328,13 +328,13 @@ def test_joint_trajectory_has_one_point_to_be_taken_at_once(make_bench):
     graph = Graph(bench)
     graph.image()
     graph.image()
-    bench.wait(lambda: len(bench.heard(JOINT_TRAJECTORY)) == 2)
-    trajectory = bench.heard(JOINT_TRAJECTORY)[-1]
+    bench.wait(lambda: len(bench.messages(JOINT_TRAJECTORY)) == 2)
+    trajectory = bench.messages(JOINT_TRAJECTORY)[-1]
     assert to_ns(trajectory.header.stamp) == 0
     assert list(trajectory.joint_names) == ['pan', 'tilt']
     [point] = trajectory.points
     assert to_ns(point.time_from_start) == 1_250_000_000
-    assert list(point.positions) == list(bench.heard(JOINT_COMMANDS)[-1].position)
+    assert list(point.positions) == list(bench.messages(JOINT_COMMANDS)[-1].position)
     assert point.positions[0] != 0.0
 
 
@@ -346,8 +346,8 @@ def test_forward_commands_stand_in_the_order_of_the_controller(make_bench):
     graph = Graph(bench)
     graph.pan = 0.4  # in the rig's count: 0.1 to the left of the middle
     graph.image()
-    bench.wait(lambda: bench.heard(FORWARD_COMMANDS))
-    assert list(bench.heard(FORWARD_COMMANDS)[-1].data) == pytest.approx([0.0, 0.4])
+    bench.wait(lambda: bench.messages(FORWARD_COMMANDS))
+    assert list(bench.messages(FORWARD_COMMANDS)[-1].data) == pytest.approx([0.0, 0.4])
 
 
 URDF = """<robot name="head"><link name="base"/><link name="neck"/><link name="eye"/>
@@ -367,11 +367,11 @@ def test_limits_of_the_robot_description(make_bench):
     assert graph.image().position[0] == 0.0
     assert graph.image().position[0] == 0.0
     assert graph.status()[1]['reason'] == 'no robot_description yet'
-    bench.say(ROBOT_DESCRIPTION, String(data=URDF.format(tilt=-1)))
+    bench.publish(ROBOT_DESCRIPTION, String(data=URDF.format(tilt=-1)))
     bench.wait_for_complaint('/robot_description: the URDF turns tilt about')
     graph.image()
     assert graph.status()[1]['reason'] == 'robot_description cannot be used'
-    bench.say(ROBOT_DESCRIPTION, String(data=URDF.format(tilt=1)))
+    bench.publish(ROBOT_DESCRIPTION, String(data=URDF.format(tilt=1)))
     bench.wait(lambda: bench.received(ROBOT_DESCRIPTION) == 2)
     commands = [graph.image({FACE_DELTA: (-2.0, 0.0)}).position[0] for _ in range(6)]
     assert commands[1] - commands[0] == pytest.approx(-0.1), 'the speed of the URDF'
@@ -395,11 +395,11 @@ class RealTime:
     def image(self, proposals=FACE_RIGHT, without=(), age_s=0.0, joints=True):
         stamp_ns = time.time_ns() - int(age_s * 1e9)
         if joints:
-            self.bench.say_posture(stamp_ns, self.pan)
+            self.bench.publish_posture(stamp_ns, self.pan)
         for topic in PROPOSALS:
             if topic not in without:
-                self.bench.say(topic, joint_state(stamp_ns, *proposals.get(topic, ())))
-        self.bench.say(EVIDENCE, encode_columns(header(stamp_ns), {'log_evidence': [0.0]}))
+                self.bench.publish(topic, joint_state(stamp_ns, *proposals.get(topic, ())))
+        self.bench.publish(EVIDENCE, encode_columns(header(stamp_ns), {'log_evidence': [0.0]}))
 
     def images(self, until, **image):
         """Images, 30 a second, until something holds."""
@@ -409,7 +409,7 @@ class RealTime:
                 self._due_s = time.monotonic() + 1 / 30
                 self.image(**image)
             self.bench.executor.spin_once(timeout_sec=0.01)
-            commands = self.bench.heard(JOINT_COMMANDS)
+            commands = self.bench.messages(JOINT_COMMANDS)
             if commands:
                 self.pan = commands[-1].position[0]
             return until()
@@ -417,7 +417,7 @@ class RealTime:
         self.bench.wait(another)
 
     def reason(self):
-        statuses = self.bench.heard(GATE_STATUS)
+        statuses = self.bench.messages(GATE_STATUS)
         values = {value.key: value.value for value in statuses[-1].values} if statuses else {}
         return values.get('reason', '')
 
@@ -430,7 +430,7 @@ def real_time(make_bench):
 def test_commands_come_at_the_control_rate_and_follow_the_profile(real_time):
     rig = real_time(hold_after_s=5.0, stall_after_s=5.0)
     rig.images(lambda: rig.pan < -0.2)
-    commands = rig.bench.heard(JOINT_COMMANDS)
+    commands = rig.bench.messages(JOINT_COMMANDS)
     pans = [command.position[0] for command in commands]
     images = {to_ns(command.header.stamp) for command in commands}
     assert len(images) < len(commands), 'more commands than images'
@@ -464,4 +464,4 @@ def test_missing_joint_states_are_named(real_time):
 def test_image_of_another_time_holds_the_head(real_time, age_s, text):
     rig = real_time(hold_after_s=5.0)
     rig.images(lambda: text in rig.reason(), age_s=age_s)
-    assert not rig.bench.heard(JOINT_COMMANDS), 'nothing was ever commanded'
+    assert not rig.bench.messages(JOINT_COMMANDS), 'nothing was ever commanded'

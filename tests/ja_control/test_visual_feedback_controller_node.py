@@ -26,13 +26,13 @@ def make(make_bench):
 
 def answers(bench, stamp_ns, detections):
     """The deltas to the target and to the face for one message of detections."""
-    bench.say(DETECTIONS, encode_detections(header(stamp_ns), detections))
+    bench.publish(DETECTIONS, encode_detections(header(stamp_ns), detections))
     bench.wait(lambda: all(stamps(bench, t)[-1:] == [stamp_ns] for t in (VF_DELTA, FACE_DELTA)))
-    return bench.heard(VF_DELTA)[-1], bench.heard(FACE_DELTA)[-1]
+    return bench.messages(VF_DELTA)[-1], bench.messages(FACE_DELTA)[-1]
 
 
 def stamps(bench, topic):
-    return [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in bench.heard(topic)]
+    return [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in bench.messages(topic)]
 
 
 def test_most_salient_object_and_face_are_each_centred(make):
@@ -97,7 +97,7 @@ def test_broken_message_is_one_clear_error_and_the_node_lives_on(make, spoil, te
     bench = make()
     message = encode_detections(header(1), [BRIGHT])
     spoil(message)
-    bench.say(DETECTIONS, message)
+    bench.publish(DETECTIONS, message)
     bench.wait_for_complaint(text)
     answers(bench, 2, [BRIGHT])
     assert stamps(bench, VF_DELTA) == [2], 'no answer to what was broken'

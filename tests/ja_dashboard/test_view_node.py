@@ -47,9 +47,9 @@ def status(name='', level=DiagnosticStatus.OK, text='', **values):
 
 @pytest.fixture
 def bench(make_bench):
-    bench = make_bench(ViewNode, says=ALWAYS)
+    bench = make_bench(ViewNode, publishes=ALWAYS)
     for topic in [*WATCHED, SIM_TRUTH]:
-        publisher = bench.peer.create_publisher(topic.type, topic.name, topic.says)
+        publisher = bench.peer.create_publisher(topic.type, topic.name, topic.publisher_qos)
         bench._publishers[topic.name] = publisher
     wait_for_ears(bench, [GATE_STATUS, FIXATION])
     return bench
@@ -74,11 +74,11 @@ def say_image(bench, stamp_ns, detections=(FACE,)):
     head = header(stamp_ns)
     image = np.full((240, 320, 3), 90, np.uint8)
     joints = JointCodec(JointConfig())
-    bench.say(CAMERA_INFO, encode_camera_info(head, 320, 240, FOCAL_PX))
-    bench.say(JOINT_STATES, joints.encode_posture(head, [0.2, -0.1], [0.0, 0.0]))
-    bench.say(JOINT_COMMANDS, joints.encode_posture(head, [0.3, 0.0]))
-    bench.say(IMAGE, encode_image(image, head.stamp, 'eye'))
-    bench.say(DETECTIONS, encode_detections(head, list(detections)))
+    bench.publish(CAMERA_INFO, encode_camera_info(head, 320, 240, FOCAL_PX))
+    bench.publish(JOINT_STATES, joints.encode_posture(head, [0.2, -0.1], [0.0, 0.0]))
+    bench.publish(JOINT_COMMANDS, joints.encode_posture(head, [0.3, 0.0]))
+    bench.publish(IMAGE, encode_image(image, head.stamp, 'eye'))
+    bench.publish(DETECTIONS, encode_detections(head, list(detections)))
 
 
 def test_images_are_heard_only_while_somebody_watches(bench):
@@ -109,17 +109,17 @@ def test_an_image_is_shown_with_what_was_found_in_it(bench):
 def test_a_picture_without_its_detections_waits_for_them(bench):
     watch(bench)
     head = header(7_000_000_000)
-    bench.say(IMAGE, encode_image(np.zeros((48, 64, 3), np.uint8), head.stamp, 'eye'))
+    bench.publish(IMAGE, encode_image(np.zeros((48, 64, 3), np.uint8), head.stamp, 'eye'))
     bench.wait(lambda: bench.node.frame.state.run is Run.RUNNING)
     assert bench.node.frame.picture is None
-    bench.say(DETECTIONS, encode_detections(head, []))
+    bench.publish(DETECTIONS, encode_detections(head, []))
     bench.wait(lambda: bench.node.frame.picture)
 
 
 def test_the_belief_is_drawn_when_it_comes(bench):
     watch(bench)
     columns = {'pan': [0.1, 0.2], 'tilt': [0.0, 0.1], 'weight': [0.25, 0.75]}
-    bench.say(BELIEF, encode_columns(header(1), columns))
+    bench.publish(BELIEF, encode_columns(header(1), columns))
     say_image(bench, 1_000_000_000)
     bench.wait(lambda: bench.node.frame.glance)
     assert bench.node.frame.glance.belief == pytest.approx(
@@ -134,7 +134,7 @@ def test_the_truth_is_heard_on_request_only(bench):
     bench.wait(lambda: hearers(bench, SIM_TRUTH) == 1)
     wait_for_ears(bench, [SIM_TRUTH])
     rows = {'x': [0.8], 'y': [0.1], 'z': [0.0], 'pan': [0.12], 'tilt': [0.0], 'attended': [1.0]}
-    bench.say(SIM_TRUTH, encode_columns(header(1), rows))
+    bench.publish(SIM_TRUTH, encode_columns(header(1), rows))
     say_image(bench, 1_000_000_000)
     bench.wait(lambda: bench.node.frame.glance)
     assert bench.node.frame.glance.truth.attended == 0
@@ -145,13 +145,13 @@ def test_the_truth_is_heard_on_request_only(bench):
 
 def test_trials_lights_and_complaints_are_gathered_unwatched(bench):
     ill = status('/gate', DiagnosticStatus.ERROR, 'stalled', rate='3')
-    bench.say(DIAGNOSTICS, DiagnosticArray(status=[ill]))
-    bench.say(GATE_STATUS, status(phase='shift', source='LM', p_lm='0.5', trials='3'))
+    bench.publish(DIAGNOSTICS, DiagnosticArray(status=[ill]))
+    bench.publish(GATE_STATUS, status(phase='shift', source='LM', p_lm='0.5', trials='3'))
     bench.wait(lambda: bench.node.frame.facts['source'] == 'LM')
     fixation = JointCodec(JointConfig()).encode(header(1), [0.1, 0.0])
-    bench.say(FIXATION, fixation)
-    bench.say(GATE_STATUS, status(phase='look', source='none', p_lm='0.5', trials='4'))
-    bench.say(SCORE, status(last='success'))
+    bench.publish(FIXATION, fixation)
+    bench.publish(GATE_STATUS, status(phase='look', source='none', p_lm='0.5', trials='4'))
+    bench.publish(SCORE, status(last='success'))
     bench.wait(lambda: 'success, last 1' in bench.node.frame.facts)
     bench.wait(lambda: bench.node.frame.facts.get('fixated by LM') == '100% of 1')
     [gate] = [light for light in bench.node.frame.lights if light.node == '/gate']
@@ -214,5 +214,5 @@ def test_settings_are_read_set_and_refused(bench, sim):
 
 def test_it_says_nothing_to_the_robot(bench):
     """Only its own health: the page listens."""
-    assert set(bench.node.said_topics.values()) == {DIAGNOSTICS}
+    assert set(bench.node.published_topics.values()) == {DIAGNOSTICS}
     assert bench.node.get_parameter('host').value == '127.0.0.1', 'and to nobody outside'

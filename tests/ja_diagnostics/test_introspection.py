@@ -79,8 +79,10 @@ def test_what_is_said_and_heard_has_the_quality_of_service_of_the_table(domain: 
     with every_node(ALL) as nodes:
         seen = 0
         for node in nodes:
-            endpoints = [(e, node.said_topics, 'says') for e in node.publishers]
-            endpoints += [(e, node.heard_topics, 'hears') for e in node.subscriptions]
+            endpoints = [(e, node.published_topics, 'publisher_qos') for e in node.publishers]
+            endpoints += [
+                (e, node.subscribed_topics, 'subscriber_qos') for e in node.subscriptions
+            ]
             for endpoint, table, side in endpoints:
                 name = endpoint.topic_name
                 if name in table:

@@ -11,10 +11,12 @@ from ja_diagnostics.topics_table import look_at_topics, table_of_topics
 
 def test_a_graph_is_listed_with_rates_and_purposes(ros_context):
     node = Node('talker', context=ros_context, namespace='/robot')
-    often = node.create_publisher(DETECTIONS.type, DETECTIONS.name, DETECTIONS.says)
-    node.create_publisher(SUCCESS_RATE.type, SUCCESS_RATE.name, SUCCESS_RATE.says)
-    node.create_subscription(DETECTIONS.type, DETECTIONS.name, lambda _: None, DETECTIONS.hears)
-    node.create_subscription(FIXATION.type, FIXATION.name, lambda _: None, FIXATION.hears)
+    often = node.create_publisher(DETECTIONS.type, DETECTIONS.name, DETECTIONS.publisher_qos)
+    node.create_publisher(SUCCESS_RATE.type, SUCCESS_RATE.name, SUCCESS_RATE.publisher_qos)
+    node.create_subscription(
+        DETECTIONS.type, DETECTIONS.name, lambda _: None, DETECTIONS.subscriber_qos
+    )
+    node.create_subscription(FIXATION.type, FIXATION.name, lambda _: None, FIXATION.subscriber_qos)
     node.create_timer(0.02, lambda: often.publish(DETECTIONS.type()))
     executor = SingleThreadedExecutor(context=ros_context)
     executor.add_node(node)

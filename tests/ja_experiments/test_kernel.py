@@ -48,13 +48,13 @@ def test_same_trials_and_same_weights_after_1000_trials(
     assert_same_outcomes(readable.run(1000), fast.run(1000))
 
     wanted, got = readable.network.state(), fast.network.state()
-    untaught = ReferenceExperiment(config, places, looks, seed=3).network.state()
+    untrained = ReferenceExperiment(config, places, looks, seed=3).network.state()
     assert got.keys() == wanted.keys()
     # Nothing in the paper asks for evidence: the kernel weighs none.
     for name in wanted.keys() - {'evidence.nats', 'evidence.faces'}:
         array = wanted[name]
         np.testing.assert_allclose(got[name], array, rtol=0, atol=1e-5, err_msg=name)
-    moved = np.abs(wanted['hidden_weights'] - untaught['hidden_weights']).max()
+    moved = np.abs(wanted['hidden_weights'] - untrained['hidden_weights']).max()
     assert moved > 1e-3, 'learning must have changed the weights by more than the tolerance'
 
 

@@ -76,7 +76,7 @@ def test_lessons_are_learned_one_by_one_in_the_order_in_which_they_came(make, sl
         background.learn(trial(number))
     settle(background)
     assert learned == [1, 2, 3, 4, 5]
-    assert background.troubles() == []
+    assert background.pop_errors() == []
 
 
 def test_the_learner_is_asked_when_it_has_learned_all(make, slow):
@@ -105,8 +105,8 @@ def test_a_lesson_that_fails_is_told_and_the_next_is_learned(make, slow):
     background.learn(None)
     background.learn(trial(0))
     settle(background)
-    assert [str(error) for error in background.troubles()] == ['nothing to learn from']
-    assert background.troubles() == []
+    assert [str(error) for error in background.pop_errors()] == ['nothing to learn from']
+    assert background.pop_errors() == []
     assert background.predictor == 'after 1'
 
 
@@ -118,7 +118,7 @@ def test_what_fails_after_a_lesson_is_told_and_the_lesson_is_kept(make, slow):
     background = make(slow, save)
     background.learn(trial(0))
     settle(background)
-    assert [str(error) for error in background.troubles()] == ['the disk is full']
+    assert [str(error) for error in background.pop_errors()] == ['the disk is full']
     assert background.predictor == 'after 1'
     with pytest.raises(OSError, match='the disk is full'):
         background.ask(save)

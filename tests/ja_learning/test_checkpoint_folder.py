@@ -9,7 +9,7 @@ import pytest
 
 from ja_common.core.config import ConfigError
 from ja_learning.core.checkpoint import load_checkpoint, save_checkpoint
-from ja_learning.core.checkpoint_folder import LAST, CheckpointConfig, CheckpointFolder, TakenUp
+from ja_learning.core.checkpoint_folder import LAST, CheckpointConfig, CheckpointFolder, Resumed
 from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
 from ja_learning.core.learner import LearnerChoice, make_learner
 from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
@@ -18,13 +18,13 @@ from made_up_trials import trial
 KINDS = (ThreeLayerNetwork.kind, GazeLineLearner.kind)
 
 
-def untaught(kind='paper', seed=0, **network):
+def untrained(kind='paper', seed=0, **network):
     gaze_line = GazeLineConfig(replay_steps=1, replay_memory=20)
     return make_learner(LearnerChoice(kind), NetworkConfig(**network), gaze_line, seed)
 
 
 def taught(trials=3, **choice):
-    learner = untaught(**choice)
+    learner = untrained(**choice)
     for number in range(trials):
         learner.learn(trial(number))
     return learner
@@ -56,8 +56,8 @@ def names(folder):
 def test_another_process_would_go_on_as_if_nothing_had_happened(folder, kind):
     learner = taught(30, kind=kind)
     path = folder.save(learner)
-    heir = untaught(kind=kind, seed=9)
-    assert folder.take_up(heir) == TakenUp(path, [])
+    heir = untrained(kind=kind, seed=9)
+    assert folder.resume_into(heir) == Resumed(path, [])
     assert same(heir, learner)
     for number in range(30, 40):
         learner.learn(trial(number))
@@ -74,9 +74,9 @@ def test_the_file_tells_the_whole_configuration(folder):
 
 
 def test_nothing_to_take_up_is_no_fault(folder):
-    learner = untaught()
-    assert folder.take_up(learner) == TakenUp(None, [])
-    assert same(learner, untaught())
+    learner = untrained()
+    assert folder.resume_into(learner) == Resumed(None, [])
+    assert same(learner, untrained())
 
 
 def test_older_ones_are_kept_and_numbers_rise_over_restarts(folder):
@@ -99,9 +99,9 @@ def test_one_learner_never_drives_out_anothers(folder):
 
 def test_who_starts_anew_is_newer_than_who_knew_more(folder):
     folder.save(taught(10))
-    path = folder.save(untaught())
+    path = folder.save(untrained())
     heir = taught(10)
-    assert folder.take_up(heir).path == path
+    assert folder.resume_into(heir).path == path
     assert heir.trials == 0
 
 
@@ -172,8 +172,8 @@ def test_what_cannot_be_used_is_refused_and_the_one_before_it_is_taken(folder, s
     before = folder.save(good)
     newest = folder.save(taught(5))
     spoil(newest)
-    heir = untaught(seed=9)
-    path, [refused] = folder.take_up(heir)
+    heir = untrained(seed=9)
+    path, [refused] = folder.resume_into(heir)
     assert path == before
     assert str(newest) in refused
     assert sentence in refused
@@ -185,10 +185,10 @@ def test_what_cannot_be_used_is_refused_and_the_one_before_it_is_taken(folder, s
 def test_when_none_can_be_used_nobody_starts_untaught_unnoticed(folder):
     for _ in range(2):
         spoil_by_cutting(folder.save(taught()))
-    learner = untaught(seed=9)
+    learner = untrained(seed=9)
     with pytest.raises(ConfigError, match=r'none of the 2 checkpoints .* newest: .*000002'):
-        folder.take_up(learner)
-    assert same(learner, untaught(seed=9))
+        folder.resume_into(learner)
+    assert same(learner, untrained(seed=9))
 
 
 def test_one_process_at_a_time_has_the_folder(folder):
@@ -225,14 +225,14 @@ def test_a_full_disk_costs_nothing_that_was_saved(folder, monkeypatch):
     monkeypatch.setattr(np, 'savez', full)
     with pytest.raises(OSError, match='No space left'):
         folder.save(taught(5))
-    heir = untaught(seed=9)
-    assert folder.take_up(heir) == TakenUp(path, [])
+    heir = untrained(seed=9)
+    assert folder.resume_into(heir) == Resumed(path, [])
     assert same(heir, good)
 
 
 def test_it_is_saved_every_so_many_trials_and_at_the_end_if_need_be(tmp_path):
     folder = reopened(tmp_path, checkpoint_every_trials=4)
-    learner = untaught()
+    learner = untrained()
     saved = []
     for number in range(10):
         learner.learn(trial(number))
@@ -248,8 +248,8 @@ def test_it_is_saved_every_so_many_trials_and_at_the_end_if_need_be(tmp_path):
 def test_who_goes_on_is_saved_when_so_many_more_were_learned(tmp_path):
     folder = reopened(tmp_path, checkpoint_every_trials=4)
     folder.save(taught(6))
-    learner = untaught()
-    folder.take_up(learner)
+    learner = untrained()
+    folder.resume_into(learner)
     folder.save_when_changed(learner)
     assert len(names(folder)[1:]) == 1
     for number in range(4):

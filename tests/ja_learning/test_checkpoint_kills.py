@@ -20,15 +20,15 @@ LONGEST_LIFE_S = 0.6
 pytestmark = pytest.mark.slow
 
 
-def untaught() -> GazeLineLearner:
+def untrained() -> GazeLineLearner:
     return GazeLineLearner(GazeLineConfig(replay_steps=1), seed=0)
 
 
 def live(folder: Path, tell: Connection) -> None:
     """Take up what was learned; learn, save and tell the count of trials, until killed."""
-    learner = untaught()
+    learner = untrained()
     checkpoints = CheckpointFolder(folder, CONFIG)
-    checkpoints.take_up(learner)
+    checkpoints.resume_into(learner)
     tell.send(learner.trials)
     while True:
         learner.learn(trial(learner.trials))
@@ -53,9 +53,9 @@ def test_fifty_kills_cost_few_trials_each_and_nothing_else(tmp_path):
         life.join()
         lived = last_told(hear, saved)
         died_writing += bool(list(tmp_path.glob('.*.npz.*')))
-        heir = untaught()
+        heir = untrained()
         checkpoints = CheckpointFolder(tmp_path, CONFIG)
-        assert checkpoints.take_up(heir).refused == [], 'every file that is there is whole'
+        assert checkpoints.resume_into(heir).refused == [], 'every file that is there is whole'
         checkpoints.close()
         assert heir.trials >= max(saved, lived - EVERY_TRIALS)
         saved = heir.trials
@@ -74,7 +74,7 @@ def last_told(hear: Connection, count: int) -> int:
 
 
 def uninterrupted(trials: int) -> GazeLineLearner:
-    learner = untaught()
+    learner = untrained()
     for number in range(trials):
         learner.learn(trial(number))
     return learner

@@ -23,43 +23,43 @@ def bench(make_bench):
 def test_fixation_is_where_the_head_looked_when_the_image_was_taken(bench):
     """Not when the detections came: the newest joint state is far ahead."""
     for ms, pan in ((100, 0.1), (200, 0.1), (300, 0.9)):
-        bench.say_posture(ms * MS, pan)
+        bench.publish_posture(ms * MS, pan)
     bench.wait(lambda: bench.received(JOINT_STATES) == 3)
-    bench.say(DETECTIONS, encode_detections(header(150 * MS), [BALL]))
+    bench.publish(DETECTIONS, encode_detections(header(150 * MS), [BALL]))
     fixation = bench.next(FIXATION)
     assert fixation.header == header(150 * MS)
     assert list(fixation.position) == pytest.approx([0.1 - math.atan(0.05), 0.0], abs=1e-6)
 
 
 def test_nothing_in_the_centre_is_said_too(bench):
-    bench.say_posture(100 * MS)
+    bench.publish_posture(100 * MS)
     for seen in ([FAR_BALL], []):
-        bench.say(DETECTIONS, encode_detections(header(100 * MS), seen))
+        bench.publish(DETECTIONS, encode_detections(header(100 * MS), seen))
         assert not bench.next(FIXATION).name
 
 
 def test_moving_head_fixates_nothing(bench):
-    bench.say_posture(100 * MS, velocity=[0.5, 0.0])
-    bench.say(DETECTIONS, encode_detections(header(100 * MS), [BALL]))
+    bench.publish_posture(100 * MS, velocity=[0.5, 0.0])
+    bench.publish(DETECTIONS, encode_detections(header(100 * MS), [BALL]))
     assert not bench.next(FIXATION).name
 
 
 def test_image_waits_for_the_joint_states_of_its_time(bench):
-    bench.say(DETECTIONS, encode_detections(header(150 * MS), [BALL]))
-    bench.say_posture(100 * MS, 0.2)
+    bench.publish(DETECTIONS, encode_detections(header(150 * MS), [BALL]))
+    bench.publish_posture(100 * MS, 0.2)
     bench.wait(lambda: bench.received(JOINT_STATES) == 1)
-    assert not bench.heard(FIXATION)
-    bench.say_posture(200 * MS, 0.2)
+    assert not bench.messages(FIXATION)
+    bench.publish_posture(200 * MS, 0.2)
     assert bench.next(FIXATION).position[0] == pytest.approx(0.2 - math.atan(0.05))
 
 
 def test_clock_set_back_is_survived_even_while_an_image_waits(bench):
-    bench.say_posture(90_000 * MS)
-    bench.say(DETECTIONS, encode_detections(header(90_100 * MS), [BALL]))
+    bench.publish_posture(90_000 * MS)
+    bench.publish(DETECTIONS, encode_detections(header(90_100 * MS), [BALL]))
     bench.wait(lambda: bench.received(DETECTIONS) == 1)
     for ms in (1_000, 1_100):
-        bench.say_posture(ms * MS)
-    bench.say(DETECTIONS, encode_detections(header(1_050 * MS), [BALL]))
+        bench.publish_posture(ms * MS)
+    bench.publish(DETECTIONS, encode_detections(header(1_050 * MS), [BALL]))
     assert bench.next(FIXATION).header == header(1_050 * MS)
 
 
@@ -71,17 +71,17 @@ def test_clock_set_back_is_survived_even_while_an_image_waits(bench):
     ],
 )
 def test_broken_joint_state_is_one_clear_error_and_the_node_lives_on(bench, message, text):
-    bench.say(JOINT_STATES, message)
+    bench.publish(JOINT_STATES, message)
     bench.wait_for_complaint(f'/joint_states: {text}')
-    bench.say_posture(100 * MS)
-    bench.say(DETECTIONS, encode_detections(header(100 * MS), [BALL]))
+    bench.publish_posture(100 * MS)
+    bench.publish(DETECTIONS, encode_detections(header(100 * MS), [BALL]))
     assert bench.next(FIXATION).name
 
 
 def test_threshold_is_set_while_running(bench):
-    bench.say_posture(100 * MS)
+    bench.publish_posture(100 * MS)
     assert bench.set_parameter('d_th_rad', 0.01).successful
-    bench.say(DETECTIONS, encode_detections(header(100 * MS), [BALL]))
+    bench.publish(DETECTIONS, encode_detections(header(100 * MS), [BALL]))
     assert not bench.next(FIXATION).name
     assert 'd_th_rad' in bench.set_parameter('d_th_rad', 0.0).reason
     assert 'nearest, most_salient' in bench.set_parameter('candidate', 'brightest').reason

@@ -37,7 +37,7 @@ FACE = np.random.default_rng(0).integers(0, 256, (30, 25)).astype(np.uint8)
 SAYS = [DETECTIONS, FACE_IMAGE, FIXATION, JOINT_STATES]
 
 
-class Life:
+class TrialLoop:
     """What the learner lives through, image after image; it answers each."""
 
     def __init__(self, bench):
@@ -46,7 +46,7 @@ class Life:
 
     def look(self, face=FACE, pan=0.0):
         stamp_ns = self._tick(pan)
-        self.bench.say(FACE_IMAGE, encode_image(face, header(stamp_ns).stamp, 'eye'))
+        self.bench.publish(FACE_IMAGE, encode_image(face, header(stamp_ns).stamp, 'eye'))
         return self._see(stamp_ns, [ATTENDED])
 
     def rest(self, pan, detections=()):
@@ -74,11 +74,11 @@ class Life:
 
     def _tick(self, pan, **more):
         self.ms += 100
-        self.bench.say_posture(self.ms * MS, pan, **more)
+        self.bench.publish_posture(self.ms * MS, pan, **more)
         return self.ms * MS
 
     def _see(self, stamp_ns, detections, fixation=()):
-        self.bench.say(DETECTIONS, encode_detections(header(stamp_ns), detections))
+        self.bench.publish(DETECTIONS, encode_detections(header(stamp_ns), detections))
         answer = self.bench.next(LM_DELTA)
         assert answer.header == header(stamp_ns)
         self._say_fixation(stamp_ns, fixation)
@@ -86,7 +86,7 @@ class Life:
 
     def _say_fixation(self, stamp_ns, direction):
         before = self.bench.received(FIXATION)
-        self.bench.say(FIXATION, joint_state(stamp_ns, *direction))
+        self.bench.publish(FIXATION, joint_state(stamp_ns, *direction))
         self.bench.wait(lambda: self.bench.received(FIXATION) > before)
 
 
@@ -94,7 +94,7 @@ class Life:
 def make_life(make_bench):
     def make(**parameters):
         hears = [LM_DELTA, GLANCE_DELTA, EVIDENCE]
-        return Life(make_bench(LearningModuleNode, SAYS, hears, **parameters))
+        return TrialLoop(make_bench(LearningModuleNode, SAYS, hears, **parameters))
 
     return make
 
@@ -119,8 +119,8 @@ def test_nothing_is_proposed_before_a_look_and_after_the_fixation(life):
 
 def test_face_image_may_come_after_its_detections(life):
     stamp_ns = life._tick(0.0)
-    life.bench.say(DETECTIONS, encode_detections(header(stamp_ns), [ATTENDED]))
-    life.bench.say(FACE_IMAGE, encode_image(FACE, header(stamp_ns).stamp, 'eye'))
+    life.bench.publish(DETECTIONS, encode_detections(header(stamp_ns), [ATTENDED]))
+    life.bench.publish(FACE_IMAGE, encode_image(FACE, header(stamp_ns).stamp, 'eye'))
     assert life.bench.next(LM_DELTA).name
 
 
@@ -183,12 +183,12 @@ def test_disabled_learning_still_proposes(life):
 
 
 def test_reset_forgets_everything(life):
-    untaught = list(life.look().position)
+    untrained = list(life.look().position)
     life.trial()
-    assert list(life.look().position) != untaught
+    assert list(life.look().position) != untrained
     assert life.bench.call(Trigger, 'reset_learning').success
     assert not life.rest(0.0).name, 'the trial under way too'
-    assert list(life.look().position) == untaught
+    assert list(life.look().position) == untrained
 
 
 def test_what_was_learned_is_taken_up_by_the_next_process(make_life, tmp_path):
@@ -247,12 +247,12 @@ def test_it_is_saved_every_so_many_trials(make_life, tmp_path):
 
 def test_what_is_forgotten_stays_forgotten(make_life, tmp_path):
     first = make_life(checkpoint_folder=str(tmp_path), checkpoint_every_trials=1)
-    untaught = list(first.look().position)
+    untrained = list(first.look().position)
     first.trial()
     assert first.bench.call(Trigger, 'reset_learning').success
     first.bench.close()
     second = make_life(checkpoint_folder=str(tmp_path), seed=5)
-    assert list(second.look().position) == untaught
+    assert list(second.look().position) == untrained
 
 
 def test_a_damaged_checkpoint_is_told_and_the_one_before_it_is_used(make_life, tmp_path):
@@ -332,8 +332,8 @@ def test_broken_face_image_is_one_clear_error_and_the_node_lives_on(life, spoil,
     message = encode_image(FACE, header(stamp_ns).stamp, 'eye')
     for name, value in spoil.items():
         setattr(message, name, value)
-    life.bench.say(DETECTIONS, encode_detections(header(stamp_ns), [ATTENDED]))
-    life.bench.say(FACE_IMAGE, message)
+    life.bench.publish(DETECTIONS, encode_detections(header(stamp_ns), [ATTENDED]))
+    life.bench.publish(FACE_IMAGE, message)
     life.bench.wait_for_complaint(text)
     assert '/face_image: ' in life.bench.complaint()
     life.trial()
@@ -341,14 +341,14 @@ def test_broken_face_image_is_one_clear_error_and_the_node_lives_on(life, spoil,
 
 def test_broken_fixation_is_one_clear_error_and_the_node_lives_on(life):
     life.look()
-    life.bench.say(FIXATION, joint_state(life.ms * MS, float('nan'), 0.0))
+    life.bench.publish(FIXATION, joint_state(life.ms * MS, float('nan'), 0.0))
     life.bench.wait_for_complaint('/fixation: position of')
     life.trial()
 
 
 def test_another_learner_may_be_chosen_while_the_node_runs(make_bench):
-    bench = make_bench(LearningModuleNode, says=SAYS, hears=[LM_DELTA])
-    life = Life(bench)
+    bench = make_bench(LearningModuleNode, publishes=SAYS, subscribes=[LM_DELTA])
+    life = TrialLoop(bench)
     life.trial()
     assert bench.set_parameter('learner', 'gaze_line').successful
     life.look()
@@ -362,16 +362,16 @@ def test_another_learner_may_be_chosen_while_the_node_runs(make_bench):
 @pytest.mark.parametrize('learner', ['paper', 'gaze_line'])
 def test_the_belief_is_told_to_who_looks(make_bench, learner):
     bench = make_bench(LearningModuleNode, SAYS, [LM_DELTA, BELIEF], learner=learner)
-    life = Life(bench)
+    life = TrialLoop(bench)
     life.rest(0.0)
     life.look(pan=0.1)
-    bench.wait(lambda: len(bench.heard(BELIEF)) == 2)
-    before, looking = bench.heard(BELIEF)
+    bench.wait(lambda: len(bench.messages(BELIEF)) == 2)
+    before, looking = bench.messages(BELIEF)
     assert before.width == 0, 'no trial is under way'
     told = decode_columns(looking, ('pan', 'tilt', 'weight'))
     assert len(told['pan']) == BELIEF_SAMPLES
     assert told['weight'].sum() == pytest.approx(1.0, abs=1e-5)
-    assert np.mean(told['pan']) == pytest.approx(0.1, abs=0.1), 'an untaught belief is about her'
+    assert np.mean(told['pan']) == pytest.approx(0.1, abs=0.1), 'an untrained belief is about her'
 
 
 def test_glances_are_asked_for_until_both_sides_were_seen(make_life):
@@ -382,8 +382,8 @@ def test_glances_are_asked_for_until_both_sides_were_seen(make_life):
             life.look()
         else:
             life.rest(pan)
-        life.bench.wait(lambda: len(life.bench.heard(GLANCE_DELTA)) == life.ms // 100)
-        return list(life.bench.heard(GLANCE_DELTA)[-1].position)
+        life.bench.wait(lambda: len(life.bench.messages(GLANCE_DELTA)) == life.ms // 100)
+        return list(life.bench.messages(GLANCE_DELTA)[-1].position)
 
     assert glance_at(None) == pytest.approx([0.4, 0.0])
     assert glance_at(0.4) == pytest.approx([-0.8, 0.0])
@@ -395,11 +395,11 @@ def test_evidence_is_told_with_every_image_of_the_learner(make_life):
     life = make_life(learner='gaze_line')
     life.look()
     life.rest(0.2)
-    life.bench.wait(lambda: len(life.bench.heard(EVIDENCE)) == 2)
-    stamps = [message.header for message in life.bench.heard(EVIDENCE)]
+    life.bench.wait(lambda: len(life.bench.messages(EVIDENCE)) == 2)
+    stamps = [message.header for message in life.bench.messages(EVIDENCE)]
     assert stamps == [header(100 * MS), header(200 * MS)]
     told = [
-        decode_columns(m, ['log_evidence'])['log_evidence'] for m in life.bench.heard(EVIDENCE)
+        decode_columns(m, ['log_evidence'])['log_evidence'] for m in life.bench.messages(EVIDENCE)
     ]
     assert told == [[0.0], [0.0]], 'nothing is known yet'
 

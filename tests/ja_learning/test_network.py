@@ -153,9 +153,9 @@ def test_state_restored_continues_bit_for_bit():
 
 def test_untaught_state_restores_an_untaught_network():
     taught = ThreeLayerNetwork(NetworkConfig(), seed=0)
-    untaught = taught.state()
+    untrained = taught.state()
     taught.learn(make_trial())
-    taught.restore(untaught)
+    taught.restore(untrained)
     fresh = ThreeLayerNetwork(NetworkConfig(), seed=0)
     for network in (taught, fresh):
         network.learn(make_trial())

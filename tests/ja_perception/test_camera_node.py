@@ -29,8 +29,10 @@ def test_pictures_and_calibration_come_together(ros_context, tmp_path):
     )
     listener = rclpy.create_node('listener', context=ros_context)
     images, infos = [], []
-    listener.create_subscription(IMAGE.type, 'image_raw', images.append, IMAGE.hears)
-    listener.create_subscription(CAMERA_INFO.type, 'camera_info', infos.append, IMAGE.hears)
+    listener.create_subscription(IMAGE.type, 'image_raw', images.append, IMAGE.subscriber_qos)
+    listener.create_subscription(
+        CAMERA_INFO.type, 'camera_info', infos.append, IMAGE.subscriber_qos
+    )
     executor = SingleThreadedExecutor(context=ros_context)
     executor.add_node(node)
     executor.add_node(listener)

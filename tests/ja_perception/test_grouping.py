@@ -57,7 +57,7 @@ def test_stripes_are_one_object():
 
 def test_background_and_specks_are_no_objects():
     picture = room(160, 120)
-    picture[90:] = GREEN  # a meadow from border to border
+    picture[90:] = GREEN  # a meadow from guard to guard
     picture[10, 20] = RED
     assert regions_in(picture) == []
     picture[:] = BLUE

@@ -48,7 +48,7 @@ class Rig:
         for topic in (DETECTIONS, FACE_IMAGE, TARGET, FACE, DIAGNOSTICS):
             self.listen(topic)
         self.publishers = {
-            topic.name: self.node.create_publisher(topic.type, topic.name, topic.says)
+            topic.name: self.node.create_publisher(topic.type, topic.name, topic.publisher_qos)
             for topic in (IMAGE, CAMERA_INFO, JOINT_STATES)
         }
         hears = [p for n, p in self.publishers.items() if n != IMAGE.name or not parameters]
@@ -58,7 +58,7 @@ class Rig:
         def keep(message):
             self.heard.append((topic.name, message))
 
-        self.node.create_subscription(topic.type, topic.name, keep, topic.says)
+        self.node.create_subscription(topic.type, topic.name, keep, topic.publisher_qos)
         self.wait(lambda: self.node.count_publishers(topic.name))
 
     def wait(self, condition, timeout_s=10.0):
@@ -219,7 +219,7 @@ def test_compressed_images_by_parameter(ros_context):
     rig = Rig(ros_context, compressed=True)
     jpeg = cv2.imencode('.jpg', caregiver_and_ball()[..., ::-1])[1]
     topic = IMAGE_COMPRESSED
-    publisher = rig.node.create_publisher(topic.type, topic.name, topic.says)
+    publisher = rig.node.create_publisher(topic.type, topic.name, topic.publisher_qos)
     rig.wait(publisher.get_subscription_count)
     rig.joints(PERIOD_NS)
     info = encode_camera_info(Header(), 320, 240, FOCAL_PX)

@@ -34,7 +34,7 @@ ALWAYS_SPEAK = '^/(rosout|parameter_events|diagnostics)$'
 def test_every_topic_is_recorded_but_those_left_out(make_bench, tmp_path):
     bench = make_bench(RecorderNode, folder=str(tmp_path / 'r'), exclude='image_annotated|target')
     topics = (SUCCESS_RATE, IMAGE, IMAGE_ANNOTATED, TARGET)
-    publishers = {t: bench.peer.create_publisher(t.type, t.name, t.says) for t in topics}
+    publishers = {t: bench.peer.create_publisher(t.type, t.name, t.publisher_qos) for t in topics}
     heard = (publishers[SUCCESS_RATE], publishers[IMAGE])
     bench.wait(lambda: all(p.get_subscription_count() for p in heard))
     for topic, publisher in publishers.items():
@@ -53,7 +53,7 @@ def test_another_library_decodes_every_type_of_the_graph(make_bench, tmp_path):
     """By the schemas in the file alone: ours on one side, rosbags on the other."""
     bench = make_bench(RecorderNode, folder=str(tmp_path / 'r'), exclude=ALWAYS_SPEAK)
     topics = [topic for topic in TOPICS if not re.match(ALWAYS_SPEAK, topic.name)]
-    publishers = {t: bench.peer.create_publisher(t.type, t.name, t.says) for t in topics}
+    publishers = {t: bench.peer.create_publisher(t.type, t.name, t.publisher_qos) for t in topics}
     bench.wait(lambda: all(p.get_subscription_count() for p in publishers.values()))
     for topic, publisher in publishers.items():
         message = topic.type()
@@ -109,11 +109,15 @@ def rates(count: int, every_ns: int):
 def test_a_recording_is_said_again_with_its_time(make_bench, tmp_path):
     path = write_recording(tmp_path / 'r', rates(5, 10**8))
     bench = make_bench(
-        PlayerNode, hears=[SUCCESS_RATE, CLOCK], recording=str(path), speed=4.0, start_after_s=0.2
+        PlayerNode,
+        subscribes=[SUCCESS_RATE, CLOCK],
+        recording=str(path),
+        speed=4.0,
+        start_after_s=0.2,
     )
-    bench.wait(lambda: bench.node.done and len(bench.heard(SUCCESS_RATE)) == 5)
-    assert [message.data for message in bench.heard(SUCCESS_RATE)] == [0.0, 1.0, 2.0, 3.0, 4.0]
-    clock = [to_ns(message.clock) for message in bench.heard(CLOCK)]
+    bench.wait(lambda: bench.node.done and len(bench.messages(SUCCESS_RATE)) == 5)
+    assert [message.data for message in bench.messages(SUCCESS_RATE)] == [0.0, 1.0, 2.0, 3.0, 4.0]
+    clock = [to_ns(message.clock) for message in bench.messages(CLOCK)]
     assert clock == sorted(clock)
     assert clock[0] >= T0_NS
     assert clock[-1] <= T0_NS + 10**9
@@ -122,19 +126,19 @@ def test_a_recording_is_said_again_with_its_time(make_bench, tmp_path):
 def test_the_recorded_clock_wins(make_bench, tmp_path):
     said = [*rates(2, 10**7), (2 * 10**7, CLOCK, Clock(clock=to_time(77)))]
     path = write_recording(tmp_path / 'r', said)
-    bench = make_bench(PlayerNode, hears=[CLOCK], recording=str(path), start_after_s=0.2)
-    bench.wait(lambda: bench.node.done and bench.heard(CLOCK))
-    assert [to_ns(message.clock) for message in bench.heard(CLOCK)] == [77]
+    bench = make_bench(PlayerNode, subscribes=[CLOCK], recording=str(path), start_after_s=0.2)
+    bench.wait(lambda: bench.node.done and bench.messages(CLOCK))
+    assert [to_ns(message.clock) for message in bench.messages(CLOCK)] == [77]
 
 
 def test_topics_are_left_out(make_bench, tmp_path):
     said = [*rates(2, 10), (5, TARGET, TARGET.type())]
     path = write_recording(tmp_path / 'r', said)
     bench = make_bench(
-        PlayerNode, hears=[TARGET], recording=str(path), without='sim/success_rate',
+        PlayerNode, subscribes=[TARGET], recording=str(path), without='sim/success_rate',
         start_after_s=0.2,
     )  # fmt: skip
-    bench.wait(lambda: bench.node.done and bench.heard(TARGET))
+    bench.wait(lambda: bench.node.done and bench.messages(TARGET))
     assert bench.node.played == 1
 
 

@@ -15,12 +15,12 @@ def status(level: bytes = DiagnosticStatus.OK, name: str = '', text: str = '', *
 
 
 def test_it_counts_trials_and_keeps_the_gates_state(make_bench):
-    bench = make_bench(ProgressNode, says=[GATE_STATUS, SCORE])
+    bench = make_bench(ProgressNode, publishes=[GATE_STATUS, SCORE])
     assert bench.node.elapsed_s == 0
-    bench.say(GATE_STATUS, status(phase='shift', source='LM', p_lm='0.25', trials='7'))
+    bench.publish(GATE_STATUS, status(phase='shift', source='LM', p_lm='0.25', trials='7'))
     bench.wait(lambda: bench.node.images == 1)
     for last in ('success', 'failure', 'given up'):
-        bench.say(SCORE, status(last=last, objects='3'))
+        bench.publish(SCORE, status(last=last, objects='3'))
     bench.wait(lambda: len(bench.node.curve.records) == 3)
     assert [record.success for record in bench.node.curve.records] == [True, False, False]
     assert {record.p_lm for record in bench.node.curve.records} == {0.25}
@@ -32,10 +32,12 @@ def test_it_counts_trials_and_keeps_the_gates_state(make_bench):
 
 
 def test_a_complaint_is_shown_until_it_is_over(make_bench):
-    bench = make_bench(ProgressNode, says=[DIAGNOSTICS])
-    bench.say(DIAGNOSTICS, DiagnosticArray(status=[status(DiagnosticStatus.WARN, '/gate', 'no')]))
+    bench = make_bench(ProgressNode, publishes=[DIAGNOSTICS])
+    bench.publish(
+        DIAGNOSTICS, DiagnosticArray(status=[status(DiagnosticStatus.WARN, '/gate', 'no')])
+    )
     bench.wait(lambda: bench.node.facts().get('/gate') == 'no')
-    bench.say(DIAGNOSTICS, DiagnosticArray(status=[status(DiagnosticStatus.OK, '/gate')]))
+    bench.publish(DIAGNOSTICS, DiagnosticArray(status=[status(DiagnosticStatus.OK, '/gate')]))
     bench.wait(lambda: '/gate' not in bench.node.facts())
 
 

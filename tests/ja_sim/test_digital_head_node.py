@@ -20,9 +20,11 @@ def test_obeys_commands_and_speaks_with_the_stamp_of_the_wide_picture(ros_contex
     rig = rclpy.create_node('rig', context=ros_context)
     heard = {topic.name: [] for topic in (IMAGE, CAMERA_INFO, JOINT_STATES)}
     for topic in (IMAGE, CAMERA_INFO, JOINT_STATES):
-        rig.create_subscription(topic.type, topic.name, heard[topic.name].append, topic.says)
-    wide = rig.create_publisher(WIDE_IMAGE.type, WIDE_IMAGE.name, WIDE_IMAGE.says)
-    commands = rig.create_publisher(JointState, JOINT_COMMANDS.name, JOINT_COMMANDS.says)
+        rig.create_subscription(
+            topic.type, topic.name, heard[topic.name].append, topic.publisher_qos
+        )
+    wide = rig.create_publisher(WIDE_IMAGE.type, WIDE_IMAGE.name, WIDE_IMAGE.publisher_qos)
+    commands = rig.create_publisher(JointState, JOINT_COMMANDS.name, JOINT_COMMANDS.publisher_qos)
     executor = SingleThreadedExecutor(context=ros_context)
     executor.add_node(head)
     executor.add_node(rig)

@@ -32,12 +32,12 @@ class Course:
             FIXATION: joint_state(self.stamp_ns, *(fixation or ())),
         }
         for topic in order:
-            self.bench.say(topic, messages[topic])
+            self.bench.publish(topic, messages[topic])
         self.bench.wait(lambda: self.bench.received(FIXATION) == self.bench.received(SIM_TRUTH))
 
     def score_after(self, trials):
         """The score told after so many trials: its message and its values."""
-        heard = self.bench.heard(SCORE)  # latched: only the last is sure to be heard
+        heard = self.bench.messages(SCORE)  # latched: only the last is sure to be heard
         self.bench.wait(lambda: heard and heard[-1].message.endswith(f'of {trials} trials'))
         return heard[-1].message, {value.key: value.value for value in heard[-1].values}
 
@@ -54,7 +54,7 @@ def truth(stamp_ns, trial, attended=(1.0, 0.0)):
 
 
 def told_rate(course):
-    rates = course.bench.heard(SUCCESS_RATE)
+    rates = course.bench.messages(SUCCESS_RATE)
     return rates[-1].data if rates else None
 
 
@@ -149,10 +149,10 @@ def lacking():
 )
 def test_broken_truth_is_one_clear_error_and_the_node_lives_on(make_course, message, text):
     course = make_course()
-    course.bench.say(SIM_TRUTH, message)
+    course.bench.publish(SIM_TRUTH, message)
     course.bench.wait_for_complaint('/sim/truth: ')
     assert text in course.bench.complaint()
-    course.bench.say(FIXATION, joint_state(5, math.nan, 0.0))
+    course.bench.publish(FIXATION, joint_state(5, math.nan, 0.0))
     course.bench.wait_for_complaint('/fixation: position of')
     for trial in (1, 2):
         course.image(trial, LEFT)

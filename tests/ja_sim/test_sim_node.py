@@ -40,15 +40,15 @@ class Rig:
 
     def __init__(self, bench):
         self.bench = bench
-        bench.wait(lambda: bench.heard(IMAGE))
+        bench.wait(lambda: bench.messages(IMAGE))
 
     @property
     def image(self):
-        return self.bench.heard(IMAGE)[-1]
+        return self.bench.messages(IMAGE)[-1]
 
     def command(self, *posture, stamp_ns=None):
         at = stamp(self.image) if stamp_ns is None else stamp_ns
-        self.bench.say(JOINT_COMMANDS, joint_state(at, *posture))
+        self.bench.publish(JOINT_COMMANDS, joint_state(at, *posture))
 
     def step(self, *posture):
         """Answer the last image; the one that follows."""
@@ -61,7 +61,7 @@ class Rig:
         """The message of another topic with the stamp of the last image."""
 
         def found():
-            return [m for m in self.bench.heard(topic) if stamp(m) == stamp(self.image)]
+            return [m for m in self.bench.messages(topic) if stamp(m) == stamp(self.image)]
 
         self.bench.wait(found)
         return found()[-1]
@@ -90,7 +90,7 @@ def test_every_image_comes_with_clock_posture_intrinsics_and_truth(make_rig):
     assert len(state.velocity) == 2
     truth = decode_truth(rig.at_image(SIM_TRUTH))
     assert truth.directions.shape == (3, 2)
-    assert to_ns(rig.bench.heard(CLOCK)[-1].clock) == stamp(rig.image)
+    assert to_ns(rig.bench.messages(CLOCK)[-1].clock) == stamp(rig.image)
 
 
 def test_head_obeys_and_time_passes_only_with_a_command_for_the_last_image(make_rig):
@@ -109,7 +109,7 @@ def test_head_obeys_and_time_passes_only_with_a_command_for_the_last_image(make_
 def test_image_that_is_not_answered_is_sent_again_unchanged(make_rig):
     rig = make_rig(resend_after_s=0.05)
     rig.bench.next(IMAGE, count=2)
-    images = rig.bench.heard(IMAGE)
+    images = rig.bench.messages(IMAGE)
     assert all(image == images[0] for image in images)
     assert 'sending it again' not in rig.bench.complaint(), 'a robot that starts has lost nothing'
     rig.step(0.0, 0.0)
@@ -170,7 +170,7 @@ def test_same_seed_and_commands_give_the_same_pictures_also_after_a_reset(make_r
 def test_encoders_may_be_read_several_times_an_image(make_rig):
     rig = make_rig(joint_states_per_image=4)
     rig.step(0.1, 0.0)
-    heard = rig.bench.heard(JOINT_STATES)
+    heard = rig.bench.messages(JOINT_STATES)
     for _ in range(10):  # sensors are heard best-effort: on a busy machine some get lost
         before = stamp(rig.image)
         rig.step(0.1, 0.0)
@@ -186,12 +186,12 @@ def test_encoders_may_be_read_several_times_an_image(make_rig):
 def test_real_time_needs_no_command(make_rig):
     rig = make_rig(lockstep=False, real_time_factor=5.0)
     rig.bench.next(CAMERA_INFO, count=3)
-    steps = np.diff(sorted({stamp(message) for message in rig.bench.heard(SIM_TRUTH)}))
+    steps = np.diff(sorted({stamp(message) for message in rig.bench.messages(SIM_TRUTH)}))
     assert set(steps) == {PERIOD_NS}
     rig.command(0.1, 0.0, stamp_ns=1)  # whatever its stamp
 
     def arrived():
-        return rig.bench.heard(JOINT_STATES)[-1].position[0] == pytest.approx(0.1, abs=0.01)
+        return rig.bench.messages(JOINT_STATES)[-1].position[0] == pytest.approx(0.1, abs=0.01)
 
     rig.bench.wait(arrived)
 

@@ -113,7 +113,7 @@ def _stand_ins(folder: Path) -> dict[str, list[Parameter]]:
     """Something to show for the camera, something to play, and a place to record into."""
     cv2.imwrite(str(folder / 'grey.png'), np.full((48, 64, 3), 128, np.uint8))
     recording = RecordingFolder(folder / 'played', Limits())
-    clock = Channel(CLOCK.name, 'rosgraph_msgs/msg/Clock', offered_text([CLOCK.says]))
+    clock = Channel(CLOCK.name, 'rosgraph_msgs/msg/Clock', offered_text([CLOCK.publisher_qos]))
     recording.write(clock, serialize_message(Clock()), 0, 0, 0)
     recording.close()
     return {
@@ -128,15 +128,15 @@ def topics_page(nodes: list[GraphNode]) -> str:
     says, hears = defaultdict(list), defaultdict(list)
     services: dict[str, tuple[type, list[str]]] = {}
     for node in nodes:
-        for topic in node.said_topics.values():
+        for topic in node.published_topics.values():
             says[topic.name].append(node.get_name())
-        for topic in node.heard_topics.values():
+        for topic in node.subscribed_topics.values():
             hears[topic.name].append(node.get_name())
-        for name, service in node.offered_services.items():
+        for name, service in node.advertised_services.items():
             services.setdefault(name.lstrip('/'), (service, []))[1].append(node.get_name())
     rows = [
         f'| `{topic.name}` | {_type_name(topic.type)} | {_names(says[topic.name], nodes)} '
-        f'| {_names(hears[topic.name], nodes)} | {_qos(topic.says)} / {_qos(topic.hears)} '
+        f'| {_names(hears[topic.name], nodes)} | {_qos(topic.publisher_qos)} / {_qos(topic.subscriber_qos)} '
         f'| {topic.purpose} |\n'
         for topic in TOPICS
     ]

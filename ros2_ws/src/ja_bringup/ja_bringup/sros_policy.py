@@ -38,9 +38,9 @@ def policy_xml(nodes: Iterable[GraphNode]) -> str:
         enclave = ElementTree.SubElement(enclaves, 'enclave', path=f'/{name}')
         profiles = ElementTree.SubElement(enclave, 'profiles')
         profile = ElementTree.SubElement(profiles, 'profile', ns='/', node=name)
-        said = {_bare(topic) for topic in node.said_topics} | more_said | {*_SAID_BY_ALL}
-        heard = {_bare(topic) for topic in node.heard_topics} | more_heard | {*_HEARD_BY_ALL}
-        offered = {_bare(service) for service in node.offered_services}
+        said = {_bare(topic) for topic in node.published_topics} | more_said | {*_SAID_BY_ALL}
+        heard = {_bare(topic) for topic in node.subscribed_topics} | more_heard | {*_HEARD_BY_ALL}
+        offered = {_bare(service) for service in node.advertised_services}
         offered |= {f'{name}/{service}' for service in _OFFERED_BY_ALL}
         _allow(profile, 'topics', 'publish', 'topic', said)
         _allow(profile, 'topics', 'subscribe', 'topic', heard)

@@ -1,4 +1,4 @@
-"""The node that calibrates: it takes the gate's place, with its name, parameters and border."""
+"""The node that calibrates: it takes the gate's place, with its name, parameters and guard."""
 
 import time
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ from ja_common.posture_listener import PostureListener
 from ja_common.time_codec import to_ns
 from ja_common.topics import IMAGE, JOINT_COMMANDS
 from ja_control.command_output import CommandOutput, CommandOutputConfig
-from ja_control.core.border import Border, BorderConfig
+from ja_control.core.command_guard import CommandGuard, CommandGuardConfig
 from ja_control.core.joint_limits import JointLimitsConfig
 
 _GENTLE_RAD_S2 = 1.5
@@ -31,7 +31,7 @@ _GENTLE_RAD_S2 = 1.5
 
 @dataclass(frozen=True)
 class RigConfig:
-    """What is needed beyond the course and the border."""
+    """What is needed beyond the course and the guard."""
 
     control_rate_hz: float = parameter(
         100.0, 'commands a second, and steps of the motion profile', low=10.0, high=500.0
@@ -53,20 +53,20 @@ class CalibrationRig(GraphNode):
         self._course = self.configure(CourseConfig)
         self._limits = self.configure(JointLimitsConfig)
         period_s = 1.0 / self.configure(RigConfig).control_rate_hz
-        self._border = Border(self._limits, self.configure(BorderConfig), period_s)
+        self._guard = CommandGuard(self._limits, self.configure(CommandGuardConfig), period_s)
         self._speed_rad_s = np.nan
         self._velocity = np.zeros(2)
         self._image_ns = 0
         self._joints_ns = 0
         self._postures = PostureListener(self, self.joints)
         self._output = CommandOutput(self, self.configure(CommandOutputConfig))
-        self.hear(IMAGE, self._on_image, expected_every_s=2.0)
+        self.subscribe(IMAGE, self._on_image, expected_every_s=2.0)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(period_s, self._on_period, clock=steady)
 
     def stop(self) -> None:
         """From now on brake, and hold."""
-        self._border.enable(False)
+        self._guard.enable(False)
 
     @property
     def at_rest(self) -> bool:
@@ -78,7 +78,7 @@ class CalibrationRig(GraphNode):
         if stamp_ns <= self._image_ns:
             return
         self._image_ns = stamp_ns
-        self._border.hear_image(time.monotonic(), self._age_s(stamp_ns))
+        self._guard.hear_image(time.monotonic(), self._age_s(stamp_ns))
         conductor = self.conductor
         if conductor is None or not conductor.watches:
             return
@@ -93,15 +93,15 @@ class CalibrationRig(GraphNode):
     def _on_period(self) -> None:
         now_s, measured = time.monotonic(), self._postures.newest
         if measured is not None:
-            self._border.hear_joints(measured.position, now_s, self._age_s(measured.stamp_ns))
+            self._guard.hear_joints(measured.position, now_s, self._age_s(measured.stamp_ns))
             if self.conductor is not None and measured.stamp_ns != self._joints_ns:
                 self._joints_ns = measured.stamp_ns
                 self.conductor.hear_joints(measured.stamp_ns, measured.position)
-            if self.conductor is None and self._image_ns and self._border.enabled:
+            if self.conductor is None and self._image_ns and self._guard.enabled:
                 self.conductor = self._begin(measured)
         if self.conductor is not None:
             self._lead(self.conductor)
-        command = self._border.step(now_s)
+        command = self._guard.step(now_s)
         if command.hold is not None:
             self.last_hold = command.hold.text
         self._velocity = command.velocity
@@ -125,7 +125,7 @@ class CalibrationRig(GraphNode):
             )
         reach = self._course.amplitude_rad
         ends = measured.position + np.array([[-reach], [reach]])
-        if not np.array_equal(self._border.limits.reachable(ends), ends):
+        if not np.array_equal(self._guard.limits.reachable(ends), ends):
             raise ValueError(
                 f'from {measured.position[0]:.3f}, {measured.position[1]:.3f} rad the head cannot '
                 f'turn by {reach:g} rad each way within its limits: begin nearer to their middle'
@@ -135,7 +135,7 @@ class CalibrationRig(GraphNode):
     def _lead(self, conductor: Conductor) -> None:
         if conductor.speed_rad_s != self._speed_rad_s:
             self._speed_rad_s = conductor.speed_rad_s
-            self._border.set_limits(
+            self._guard.set_limits(
                 replace(
                     self._limits,
                     max_speed_rad_s=min(self._speed_rad_s, self._limits.max_speed_rad_s),
@@ -144,8 +144,8 @@ class CalibrationRig(GraphNode):
                     ),
                 )
             )
-        if self._border.engaged:
-            self._border.aim(conductor.aim)
+        if self._guard.engaged:
+            self._guard.aim(conductor.aim)
 
     def _age_s(self, stamp_ns: int) -> float:
         return (self.get_clock().now().nanoseconds - stamp_ns) / NS_PER_S

@@ -6,7 +6,7 @@ from typing import Any
 
 from ja_calibration.calibration_file import as_dict
 from ja_calibration.rig import CalibrationRig
-from ja_common.executor import KeptWaitSetExecutor
+from ja_common.executor import CachedWaitSetExecutor
 from ja_common.private_executor import own_executor
 
 _BRAKING_S = 3.0
@@ -35,7 +35,7 @@ def run_calibration(
 
 def _spin_until_found(
     rig: CalibrationRig,
-    executor: KeptWaitSetExecutor,
+    executor: CachedWaitSetExecutor,
     patience_s: float,
     say: Callable[[str], None],
 ) -> None:
@@ -51,7 +51,7 @@ def _spin_until_found(
             raise ValueError(f'nothing went on for {patience_s:g} s; the head was {why}')
 
 
-def _brake(rig: CalibrationRig, executor: KeptWaitSetExecutor) -> None:
+def _brake(rig: CalibrationRig, executor: CachedWaitSetExecutor) -> None:
     rig.stop()
     # What the end was about has been said already.
     rig.conductor = None

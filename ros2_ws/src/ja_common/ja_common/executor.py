@@ -24,7 +24,7 @@ _PROMPT_KINDS = _KINDS[:-1]
 _PATIENCE_S = 0.02
 
 
-class KeptWaitSetExecutor(SingleThreadedExecutor):
+class CachedWaitSetExecutor(SingleThreadedExecutor):
     """Serves nodes as rclpy's own does, at a fraction of the cost when they are many.
 
     rclpy's collects all entities before every wait, wakes itself after every callback and wraps

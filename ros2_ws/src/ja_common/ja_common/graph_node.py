@@ -19,9 +19,9 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
 from ja_common.core.config import ConfigError
 from ja_common.core.health import Health, Level
-from ja_common.executor import KeptWaitSetExecutor
+from ja_common.discovery_refresher import DiscoveryRefresher
+from ja_common.executor import CachedWaitSetExecutor
 from ja_common.parameters import declare_config
-from ja_common.presence import Presence
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_common.topics import DIAGNOSTICS, Topic
 
@@ -40,11 +40,11 @@ class GraphNode(Node):
         super().__init__(name, **node_kwargs)
         self.health = Health(time.monotonic())
         # By resolved name; `./ja reference` makes the tables of docs/ from these.
-        self.heard_topics: dict[str, Topic] = {}
-        self.said_topics: dict[str, Topic] = {}
-        self.offered_services: dict[str, Any] = {}
-        self._diagnostics = self.say(DIAGNOSTICS)
-        self._presence = Presence(self)
+        self.subscribed_topics: dict[str, Topic] = {}
+        self.published_topics: dict[str, Topic] = {}
+        self.advertised_services: dict[str, Any] = {}
+        self._diagnostics = self.create_topic_publisher(DIAGNOSTICS)
+        self._discovery_refresher = DiscoveryRefresher(self)
         # Wall time, not /clock: a simulation that stands still must be reported as well.
         self.create_timer(1.0, self._report, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
@@ -54,18 +54,18 @@ class GraphNode(Node):
         """Declare a configuration dataclass as this node's parameters; see `declare_config`."""
         return declare_config(self, config_class, changed)
 
-    def say(self, topic: Topic) -> Publisher:
+    def create_topic_publisher(self, topic: Topic) -> Publisher:
         """A publisher of a topic."""
         publisher = self.create_publisher(
             topic.type,
             topic.name,
-            topic.says,
+            topic.publisher_qos,
             event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
         )
-        self.said_topics[publisher.topic_name] = topic
+        self.published_topics[publisher.topic_name] = topic
         return publisher
 
-    def hear(
+    def subscribe(
         self,
         topic: Topic,
         callback: Callable[[Any], None],
@@ -74,7 +74,7 @@ class GraphNode(Node):
         """Subscribe; when silent for longer than `expected_every_s` [s, wall time], warn why."""
 
         def guarded(message: Any) -> None:
-            self.health.heard(resolved, time.monotonic())
+            self.health.record_message(resolved, time.monotonic())
             try:
                 callback(message)
             except (ValueError, OSError) as error:
@@ -89,14 +89,16 @@ class GraphNode(Node):
             topic.type,
             topic.name,
             guarded,
-            topic.hears,
+            topic.subscriber_qos,
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
         resolved = subscription.topic_name
-        self.heard_topics[resolved] = topic
+        self.subscribed_topics[resolved] = topic
         self.health.expect(resolved, expected_every_s)
 
-    def offer(self, service_type: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:
+    def advertise_service(
+        self, service_type: Any, name: str, callback: Callable[[Any, Any], Any]
+    ) -> None:
         """A service; an error of the callback is answered as `success = False` with its text."""
 
         def guarded(request: Any, response: Any) -> Any:
@@ -111,7 +113,7 @@ class GraphNode(Node):
             return response
 
         service = self.create_service(service_type, name, guarded)
-        self.offered_services[service.srv_name] = service_type
+        self.advertised_services[service.srv_name] = service_type
 
     def folder_of_its_own(self, folder: str | Path) -> Path:
         """Where in a folder this node's files go: heads side by side differ by namespaces."""
@@ -127,10 +129,10 @@ class GraphNode(Node):
                 log.warning(message)
 
     def _report(self) -> None:
-        if halted_s := self._presence.refresh(time.monotonic()):
+        if halted_s := self._discovery_refresher.refresh(time.monotonic()):
             self.problem('halt', f'this node stood still for {halted_s:.1f} s', Level.WARN)
         silent = self.health.silent(time.monotonic())
-        for name in self.heard_topics:
+        for name in self.subscribed_topics:
             where = f'silence of {name}'
             if name in silent:
                 text = f'no message on {name} for more than {silent[name]:g} s: '
@@ -153,7 +155,7 @@ class GraphNode(Node):
         publishers = self.get_publishers_info_by_topic(name)
         if not publishers:
             return 'nobody publishes it'
-        hears = self.heard_topics[name].hears
+        hears = self.subscribed_topics[name].subscriber_qos
         for publisher in publishers:
             offered = publisher.qos_profile
             if (
@@ -181,7 +183,7 @@ def spin_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) 
     try:
         _init(args)
         node = make_node()
-        executor = KeptWaitSetExecutor()
+        executor = CachedWaitSetExecutor()
         executor.add_node(node)
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):

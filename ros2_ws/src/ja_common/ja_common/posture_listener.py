@@ -21,7 +21,7 @@ class PostureListener:
         self._joints = joints
         self._history = PostureHistory()
         self._actions: PostureJoin[Action] = PostureJoin(self._history)
-        node.hear(JOINT_STATES, self._on_joint_states, expected_every_s=2.0)
+        node.subscribe(JOINT_STATES, self._on_joint_states, expected_every_s=2.0)
 
     @property
     def newest(self) -> Posture | None:

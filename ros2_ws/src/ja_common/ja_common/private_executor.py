@@ -6,11 +6,11 @@ from contextlib import contextmanager
 import rclpy
 from rclpy.context import Context
 
-from ja_common.executor import KeptWaitSetExecutor
+from ja_common.executor import CachedWaitSetExecutor
 
 
 @contextmanager
-def own_executor(arguments: Sequence[str] = ()) -> Iterator[KeptWaitSetExecutor]:
+def own_executor(arguments: Sequence[str] = ()) -> Iterator[CachedWaitSetExecutor]:
     """In a private context, `executor.context`; the nodes that are added to it end with it.
 
     `arguments`: ROS arguments for all of them. Signals stay with the caller.
@@ -18,7 +18,7 @@ def own_executor(arguments: Sequence[str] = ()) -> Iterator[KeptWaitSetExecutor]
     context = Context()
     cli = ['--ros-args', *arguments] if arguments else []
     rclpy.init(args=cli, context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-    executor = KeptWaitSetExecutor(context=context)
+    executor = CachedWaitSetExecutor(context=context)
     try:
         yield executor
     finally:

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 
-def go_before_all_else(priority: int) -> None:
+def enable_realtime_scheduling(priority: int) -> None:
     """Schedule all threads of this process, and those that they start, as real-time (SCHED_RR).
 
     `priority`: 1-99. Raises OSError with one sentence where that is not to be had.
@@ -22,12 +22,12 @@ def go_before_all_else(priority: int) -> None:
 
 
 def go_back_among_all() -> None:
-    """All threads of this process, after `go_before_all_else`."""
+    """All threads of this process, after `enable_realtime_scheduling`."""
     if hasattr(os, 'sched_setscheduler'):
         _schedule_all_threads(os.SCHED_OTHER, 0)
 
 
-def go_as_any_program() -> None:
+def use_default_scheduling() -> None:
     """The calling thread alone, whatever the thread that started it is."""
     if hasattr(os, 'sched_setscheduler'):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

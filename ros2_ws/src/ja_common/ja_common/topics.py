@@ -32,19 +32,22 @@ class Topic:
     name: str
     type: Any
     purpose: str
-    says: QoSProfile
-    hears: QoSProfile
+    publisher_qos: QoSProfile
+    subscriber_qos: QoSProfile
 
 
 # A sensor speaks reliably and is heard best-effort, so that any camera or rig driver matches.
 # Images are heard with depth 1: an old picture is worth nothing.
-_PICTURE = {'says': _qos(True, 1), 'hears': _qos(False, 1)}
+_PICTURE = {'publisher_qos': _qos(True, 1), 'subscriber_qos': _qos(False, 1)}
 # Joint states come several to an image, and interpolation wants them all.
-_SENSOR = {'says': _qos(True, 50), 'hears': _qos(False, 50)}
+_SENSOR = {'publisher_qos': _qos(True, 50), 'subscriber_qos': _qos(False, 50)}
 # Between our own nodes nothing may be lost: one message an image, on every topic.
-_LINK = {'says': _qos(True, 10), 'hears': _qos(True, 10)}
+_LINK = {'publisher_qos': _qos(True, 10), 'subscriber_qos': _qos(True, 10)}
 # For people and tools that come later and want the last word.
-_LATCHED = {'says': _qos(True, 1, latched=True), 'hears': _qos(True, 1, latched=True)}
+_LATCHED = {
+    'publisher_qos': _qos(True, 1, latched=True),
+    'subscriber_qos': _qos(True, 1, latched=True),
+}
 
 IMAGE = Topic('image_raw', Image, 'picture of the head camera', **_PICTURE)
 IMAGE_COMPRESSED = Topic(
@@ -124,8 +127,16 @@ GATE_STATUS = Topic(
     'gate/status', DiagnosticStatus, 'phase, source, p(LM), limits, reason of a hold', **_LINK
 )
 DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, 'health of every node, 1 Hz', **_LINK)
-LOG = Topic('/rosout', Log, 'what every node logs', says=_qos(True, 1000), hears=_qos(True, 1000))
-CLOCK = Topic('/clock', Clock, 'simulated time', says=_qos(True, 10), hears=_qos(False, 1))
+LOG = Topic(
+    '/rosout',
+    Log,
+    'what every node logs',
+    publisher_qos=_qos(True, 1000),
+    subscriber_qos=_qos(True, 1000),
+)
+CLOCK = Topic(
+    '/clock', Clock, 'simulated time', publisher_qos=_qos(True, 10), subscriber_qos=_qos(False, 1)
+)
 SIM_TRUTH = Topic('sim/truth', PointCloud2, 'where everything is and what she attends to', **_LINK)
 SUCCESS_RATE = Topic(
     'sim/success_rate', Float32, 'share of recent trials with joint attention', **_LATCHED
@@ -133,7 +144,7 @@ SUCCESS_RATE = Topic(
 SCORE = Topic('sim/score', DiagnosticStatus, 'the score in full, after every trial', **_LATCHED)
 
 EVERY_SCORE = replace(
-    SCORE, hears=QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    SCORE, subscriber_qos=QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 )
 """`SCORE` for a subscriber that counts the trials: no message may be lost."""
 

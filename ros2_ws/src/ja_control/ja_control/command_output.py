@@ -42,9 +42,11 @@ class CommandOutput:
 
     def __init__(self, node: GraphNode, config: CommandOutputConfig) -> None:
         self._config = config
-        self._joint_commands = node.say(JOINT_COMMANDS)
+        self._joint_commands = node.create_topic_publisher(JOINT_COMMANDS)
         topic = {'joint_trajectory': JOINT_TRAJECTORY, 'float64_multi_array': FORWARD_COMMANDS}
-        self._controller = node.say(topic[config.output]) if config.output in topic else None
+        self._controller = (
+            node.create_topic_publisher(topic[config.output]) if config.output in topic else None
+        )
 
     def publish(self, command: JointState) -> None:
         """Send a command: names, position [rad], velocity [rad/s], in the rig's signs."""

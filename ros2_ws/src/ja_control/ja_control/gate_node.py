@@ -43,7 +43,7 @@ from ja_control.core.attention_cycle import (
     Decision,
     Percept,
 )
-from ja_control.core.border import Border, BorderConfig, Cause, Command, Hold
+from ja_control.core.command_guard import Cause, Command, CommandGuard, CommandGuardConfig, Hold
 from ja_control.core.gating import Gating, GatingConfig
 from ja_control.core.joint_limits import JointLimitsConfig
 from ja_control.core.trial_count import load_trials, save_trials
@@ -57,7 +57,7 @@ _STATUS_EVERY_S = 0.1
 
 @dataclass(frozen=True)
 class GateConfig:
-    """What the gate needs beyond the cycle, the gating and the border."""
+    """What the gate needs beyond the cycle, the gating and the guard."""
 
     seed: int = parameter(0, 'seed of the draws between VF and LM', low=0)
     enabled_at_start: bool = parameter(True, 'move from the start, without a call of `enable`')
@@ -85,7 +85,7 @@ class GateConfig:
 class GateNode(GraphNode):
     """Takes one decision for every image on which all proposals have come, and has it obeyed.
 
-    In real time a steady timer steps the border; commands carry the header of the image that they
+    In real time a steady timer steps the guard; commands carry the header of the image that they
     follow, and the time of the clock while the head is held.
     """
 
@@ -95,9 +95,9 @@ class GateNode(GraphNode):
         self._joints = JointCodec(self.configure(JointConfig))
         self._limits = self.configure(JointLimitsConfig, self._set_limits)
         self._urdf = ''
-        self._border = Border(
+        self._guard = CommandGuard(
             self._limits,
-            self.configure(BorderConfig, self._set_border),
+            self.configure(CommandGuardConfig, self._set_guard),
             1.0 / self._config.control_rate_hz,
             self._config.enabled_at_start,
         )
@@ -105,7 +105,7 @@ class GateNode(GraphNode):
             self.configure(AttentionCycleConfig, self._set_cycle),
             Gating(self.configure(GatingConfig, self._set_gating)),
             np.random.default_rng(self._config.seed),
-            lambda target: self._border.limits.reachable(target),
+            lambda target: self._guard.limits.reachable(target),
         )
         kept = Path(self._config.trials_file)
         self._trials_file = self.folder_of_its_own(kept.parent) / kept.name
@@ -117,20 +117,22 @@ class GateNode(GraphNode):
         self._stamp_ns = 0
         self._decision: Decision | None = None
         self._answer: JointState | None = None
-        self._border_hold: Hold | None = None
+        self._guard_hold: Hold | None = None
         self._hold: Hold | None = None
         self._told_s = -np.inf
 
         for topic in _PROPOSALS:
-            self.hear(topic, self._collector(topic, self._joints.decode), expected_every_s=2.0)
-        self.hear(EVIDENCE, self._collector(EVIDENCE, _log_evidence), expected_every_s=2.0)
+            self.subscribe(
+                topic, self._collector(topic, self._joints.decode), expected_every_s=2.0
+            )
+        self.subscribe(EVIDENCE, self._collector(EVIDENCE, _log_evidence), expected_every_s=2.0)
         self._output = CommandOutput(self, self.configure(CommandOutputConfig))
-        self._status = self.say(GATE_STATUS)
-        self.offer(SetBool, 'enable', self._on_enable)
-        self.offer(Trigger, 'home', self._on_home)
+        self._status = self.create_topic_publisher(GATE_STATUS)
+        self.advertise_service(SetBool, 'enable', self._on_enable)
+        self.advertise_service(Trigger, 'home', self._on_home)
         if self._config.limits_from == 'robot_description':
-            self._border.blocked = f'no {ROBOT_DESCRIPTION.name} yet'
-            self.hear(ROBOT_DESCRIPTION, self._on_robot_description)
+            self._guard.blocked = f'no {ROBOT_DESCRIPTION.name} yet'
+            self.subscribe(ROBOT_DESCRIPTION, self._on_robot_description)
         if not self._config.lockstep:
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self.create_timer(1.0 / self._config.control_rate_hz, self._on_period, clock=steady)
@@ -140,10 +142,10 @@ class GateNode(GraphNode):
         if self._urdf:
             self._narrow_limits()
         else:
-            self._border.set_limits(config)
+            self._guard.set_limits(config)
 
-    def _set_border(self, config: BorderConfig) -> None:
-        self._border.config = config
+    def _set_guard(self, config: CommandGuardConfig) -> None:
+        self._guard.config = config
 
     def _set_cycle(self, config: AttentionCycleConfig) -> None:
         self._cycle.config = config
@@ -161,14 +163,14 @@ class GateNode(GraphNode):
 
     def _on_robot_description(self, message: String) -> None:
         self._urdf = message.data
-        self._border.blocked = f'{ROBOT_DESCRIPTION.name} cannot be used'
+        self._guard.blocked = f'{ROBOT_DESCRIPTION.name} cannot be used'
         self._narrow_limits()
-        self._border.blocked = ''
+        self._guard.blocked = ''
 
     def _narrow_limits(self) -> None:
         pan, tilt = (read_joint(self._urdf, name) for name in self._joints.names)
         joints = self._joints
-        self._border.set_limits(narrowed(self._limits, pan, tilt, joints.signs, joints.offsets))
+        self._guard.set_limits(narrowed(self._limits, pan, tilt, joints.signs, joints.offsets))
 
     def _collector(self, topic: Topic, decode: Callable[[Any], Any]) -> Callable[[Any], None]:
         def collect(message: Any) -> None:
@@ -191,10 +193,10 @@ class GateNode(GraphNode):
         if -REORDERED_WITHIN_S < step_s < 0.0:
             return  # late: a newer image has been answered already
         if step_s < 0.0:
-            self._border.begin_anew()  # the clock was set back
+            self._guard.begin_anew()  # the clock was set back
         self._header, self._stamp_ns = header, posture.stamp_ns
         now_s = self._now_s()
-        self._border.hear_image(now_s, self._age_s(posture.stamp_ns))
+        self._guard.hear_image(now_s, self._age_s(posture.stamp_ns))
         self._decision = self._decide(proposals, posture)
         if lockstep:
             seconds = min(max(step_s, 0.0), _LONGEST_STEP_S)
@@ -202,7 +204,7 @@ class GateNode(GraphNode):
             self._step(now_s, posture, max(1, round(seconds * self._config.control_rate_hz)))
 
     def _decide(self, proposals: dict[str, Any], posture: Posture) -> Decision | None:
-        if not self._border.engaged:
+        if not self._guard.engaged:
             self._cycle.restart()
             return None
         trials = self._cycle.trials
@@ -217,7 +219,7 @@ class GateNode(GraphNode):
                 log_evidence=proposals[EVIDENCE.name],
             )
         )
-        self._border.aim(decision.target)
+        self._guard.aim(decision.target)
         if decision.trials != trials and self._config.trials_file:
             save_trials(self._trials_file, decision.trials)
         return decision
@@ -239,8 +241,8 @@ class GateNode(GraphNode):
 
     def _step(self, now_s: float, measured: Posture | None, periods: int) -> None:
         if measured is not None:
-            self._border.hear_joints(measured.position, now_s, self._age_s(measured.stamp_ns))
-        command = self._border.step(now_s, periods)
+            self._guard.hear_joints(measured.position, now_s, self._age_s(measured.stamp_ns))
+        command = self._guard.step(now_s, periods)
         news = self._note_hold(command.hold)
         if self._config.lockstep and command.position is None and measured is not None:
             # The sim waits for an answer even of a gate that may not move.
@@ -263,7 +265,7 @@ class GateNode(GraphNode):
 
     def _note_hold(self, hold: Hold | None) -> bool:
         """Keep why the head is held, with the topics that are missing; whether it is news."""
-        news, self._border_hold = hold != self._border_hold, hold
+        news, self._guard_hold = hold != self._guard_hold, hold
         if news and hold is not None and hold.cause is Cause.SILENT:
             behind = self._postures.is_behind
             missing = [JOINT_STATES.name] if behind else sorted(self._join.missing())
@@ -280,7 +282,7 @@ class GateNode(GraphNode):
         hold, decision = self._hold, self._decision
         values = {
             'trials': str(self._cycle.trials),
-            'enabled': str(self._border.enabled),
+            'enabled': str(self._guard.enabled),
             'phase': self._cycle.phase.value,
         }
         level, message = Level.OK, self._cycle.phase.value
@@ -305,13 +307,13 @@ class GateNode(GraphNode):
         )
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> Any:
-        self._border.enable(request.data)
+        self._guard.enable(request.data)
         response.success = True
         response.message = 'enabled' if request.data else 'disabled: the head holds its posture'
         return response
 
     def _on_home(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        if not self._border.enabled:
+        if not self._guard.enabled:
             raise ValueError('the gate is disabled: call enable first')
         self._cycle.go_home()
         response.success, response.message = True, 'turning to the home posture'

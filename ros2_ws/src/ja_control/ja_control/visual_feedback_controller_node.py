@@ -19,9 +19,9 @@ class VisualFeedbackControllerNode(GraphNode):
         super().__init__('visual_feedback_controller', **node_kwargs)
         self._config = self.configure(VisualFeedbackConfig, self._reconfigure)
         self._joints = JointCodec(self.configure(JointConfig))
-        self.hear(DETECTIONS, self._on_detections, expected_every_s=2.0)
-        self._target_delta = self.say(VF_DELTA)
-        self._face_delta = self.say(FACE_DELTA)
+        self.subscribe(DETECTIONS, self._on_detections, expected_every_s=2.0)
+        self._target_delta = self.create_topic_publisher(VF_DELTA)
+        self._face_delta = self.create_topic_publisher(FACE_DELTA)
 
     def _reconfigure(self, config: VisualFeedbackConfig) -> None:
         self._config = config

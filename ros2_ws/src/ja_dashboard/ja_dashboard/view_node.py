@@ -102,9 +102,9 @@ class ViewNode(GraphNode):
         self._triggers = {name: self.create_client(Trigger, name) for name in _TRIGGERS}
         self._fixations = Mailbox(self, FIXATION, ALL_OF_ONE_LOOK)
         self._statuses = Mailbox(self, GATE_STATUS, ALL_OF_ONE_LOOK)
-        self.hear(EVERY_SCORE, self._on_score)
-        self.hear(DIAGNOSTICS, self._on_diagnostics)
-        self.hear(LOG, self._on_log)
+        self.subscribe(EVERY_SCORE, self._on_score)
+        self.subscribe(DIAGNOSTICS, self._on_diagnostics)
+        self.subscribe(LOG, self._on_log)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(LOOK_EVERY_S, self._look, clock=steady)
         self.create_timer(_ASK_EVERY_S, self._ask_parameters, clock=steady)

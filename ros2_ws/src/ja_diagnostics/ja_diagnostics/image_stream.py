@@ -24,7 +24,7 @@ _PATIENCE_S = 30.0
 def say() -> dict[str, float]:
     """Wait for the listener, then send it images; the seconds until it was found."""
     node, executor = _node('say')
-    publisher = node.create_publisher(IMAGE.type, IMAGE.name, IMAGE.says)
+    publisher = node.create_publisher(IMAGE.type, IMAGE.name, IMAGE.publisher_qos)
     began_s = time.monotonic()
     _spin_until(executor, lambda: publisher.get_subscription_count() > 0)
     discovery_s = time.monotonic() - began_s
@@ -45,7 +45,7 @@ def hear() -> dict[str, list[float]]:
     def on_image(message: Image) -> None:
         delays_ms.append(1e-6 * (time.monotonic_ns() - to_ns(message.header.stamp)))
 
-    node.create_subscription(IMAGE.type, IMAGE.name, on_image, IMAGE.hears)
+    node.create_subscription(IMAGE.type, IMAGE.name, on_image, IMAGE.subscriber_qos)
     print('listening', file=sys.stderr, flush=True)
     _spin_until(executor, lambda: delays_ms)
     heard, since_s = 0, time.monotonic()

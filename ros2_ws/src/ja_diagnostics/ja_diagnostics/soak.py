@@ -56,7 +56,7 @@ class Rates(GraphNode):
     def __init__(self, context: Context) -> None:
         super().__init__('soak', context=context)
         self.rates: dict[str, float] = {}
-        self.hear(DIAGNOSTICS, self._on_diagnostics)
+        self.subscribe(DIAGNOSTICS, self._on_diagnostics)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:

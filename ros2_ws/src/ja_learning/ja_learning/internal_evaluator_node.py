@@ -25,8 +25,8 @@ class InternalEvaluatorNode(GraphNode):
         self._joints = JointCodec(self.configure(JointConfig))
         self._evaluator = InternalEvaluator(self.configure(EvaluatorConfig, self._reconfigure))
         self._postures = PostureListener(self, self._joints)
-        self.hear(DETECTIONS, self._on_detections, expected_every_s=2.0)
-        self._fixation = self.say(FIXATION)
+        self.subscribe(DETECTIONS, self._on_detections, expected_every_s=2.0)
+        self._fixation = self.create_topic_publisher(FIXATION)
 
     def _reconfigure(self, config: EvaluatorConfig) -> None:
         self._evaluator.config = config

@@ -16,14 +16,14 @@ from ja_common.core.detection import caregiver_face, objects
 from ja_common.core.health import Level
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_common.core.stamp_join import StampJoin
-from ja_common.core.turns import Turns
+from ja_common.core.stamp_ordered_dispatcher import StampOrderedDispatcher
 from ja_common.detection_codec import decode_detections
 from ja_common.graph_node import GraphNode, spin_node
 from ja_common.image_codec import decode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.point_cloud_codec import encode_columns
 from ja_common.posture_listener import PostureListener
-from ja_common.realtime import go_before_all_else
+from ja_common.realtime import enable_realtime_scheduling
 from ja_common.time_codec import to_ns
 from ja_common.topics import (
     BELIEF,
@@ -40,7 +40,7 @@ from ja_learning.core.learning_module import LearningModule
 from ja_learning.core.look_around import LookAroundConfig
 from ja_learning.core.network import NetworkConfig
 from ja_learning.core.trial import Trial, checked_face
-from ja_learning.kept_learner import KeptLearner
+from ja_learning.persistent_learner import PersistentLearner
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class LearningModuleConfig:
 class LearningModuleNode(GraphNode):
     """One proposal an image while a trial is under way; one lesson a fixation.
 
-    Lessons are learned in a thread of their own (`KeptLearner`): no proposal waits for them.
+    Lessons are learned in a thread of their own (`PersistentLearner`): no proposal waits for them.
     """
 
     def __init__(self, **node_kwargs: Any) -> None:
@@ -80,7 +80,7 @@ class LearningModuleNode(GraphNode):
         self._joints = JointCodec(self.configure(JointConfig))
         self._learning = self._config.learning_enabled_at_start
         _share_the_interpreter()
-        self._learner = KeptLearner(self, self.untaught, self._config.lockstep)
+        self._learner = PersistentLearner(self, self.untrained, self._config.lockstep)
         self._module = LearningModule(
             lambda: self._learner.predictor,
             self.configure(LookAroundConfig),
@@ -90,22 +90,22 @@ class LearningModuleNode(GraphNode):
         self._postures = PostureListener(self, self._joints)
         self._attended = StampJoin([FACE_IMAGE.name, DETECTIONS.name])
         # First the proposal for an image, then its lesson, and only then the next proposal.
-        self._turns = Turns([DETECTIONS.name, FIXATION.name])
-        self.hear(FACE_IMAGE, self._on_face_image)
-        self.hear(DETECTIONS, self._on_detections, expected_every_s=2.0)
-        self.hear(FIXATION, self._on_fixation, expected_every_s=2.0)
-        self._delta = self.say(LM_DELTA)
-        self._glance_delta = self.say(GLANCE_DELTA)
-        self._evidence = self.say(EVIDENCE)
-        self._belief = self.say(BELIEF)
+        self._turns = StampOrderedDispatcher([DETECTIONS.name, FIXATION.name])
+        self.subscribe(FACE_IMAGE, self._on_face_image)
+        self.subscribe(DETECTIONS, self._on_detections, expected_every_s=2.0)
+        self.subscribe(FIXATION, self._on_fixation, expected_every_s=2.0)
+        self._delta = self.create_topic_publisher(LM_DELTA)
+        self._glance_delta = self.create_topic_publisher(GLANCE_DELTA)
+        self._evidence = self.create_topic_publisher(EVIDENCE)
+        self._belief = self.create_topic_publisher(BELIEF)
         # Its own generator: whether somebody looks changes nothing of what is learned.
         self._belief_random = np.random.default_rng(self._config.seed)
-        self.offer(Trigger, 'reset_learning', self._on_reset)
-        self.offer(SetBool, 'learning_enabled', self._on_learning_enabled)
+        self.advertise_service(Trigger, 'reset_learning', self._on_reset)
+        self.advertise_service(SetBool, 'learning_enabled', self._on_learning_enabled)
         if self._config.realtime_priority:
             self._answer_before_all_else()
 
-    def untaught(self) -> Learner:
+    def untrained(self) -> Learner:
         """The learner that this node teaches, before its first lesson."""
         return make_learner(
             self._choice, self._network_config, self._gaze_line_config, self._config.seed
@@ -114,7 +114,7 @@ class LearningModuleNode(GraphNode):
     def _answer_before_all_else(self) -> None:
         said = str(self._config.realtime_priority)
         try:
-            go_before_all_else(self._config.realtime_priority)
+            enable_realtime_scheduling(self._config.realtime_priority)
         except OSError as error:
             said = f'none: {error}'
             self.problem('realtime_priority', str(error), Level.WARN)

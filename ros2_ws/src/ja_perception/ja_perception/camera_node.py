@@ -48,8 +48,8 @@ class CameraNode(GraphNode):
         except SourceError as error:
             # An OSError ends the node with this one sentence.
             raise OSError(str(error)) from None
-        self._says_image = self.say(IMAGE)
-        self._says_info = self.say(CAMERA_INFO)
+        self._says_image = self.create_topic_publisher(IMAGE)
+        self._says_info = self.create_topic_publisher(CAMERA_INFO)
         rate_hz = config.rate_hz or self._source.rate_hz or 15.0
         self.create_timer(1 / rate_hz, self._show_next)
 

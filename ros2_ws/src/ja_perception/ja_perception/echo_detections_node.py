@@ -20,7 +20,7 @@ class EchoDetectionsNode(GraphNode):
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('echo_detections', **node_kwargs)
-        self.hear(DETECTIONS, self._on_detections, expected_every_s=2.0)
+        self.subscribe(DETECTIONS, self._on_detections, expected_every_s=2.0)
 
     def _on_detections(self, message: PointCloud2) -> None:
         print(table(to_ns(message.header.stamp), decode_detections(message)), flush=True)

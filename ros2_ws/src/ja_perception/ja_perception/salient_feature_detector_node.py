@@ -90,16 +90,16 @@ class SalientFeatureDetectorNode(GraphNode):
             self._postures, self._input.posture_wait_s
         )
 
-        self._says_detections = self.say(DETECTIONS)
-        self._says_target = self.say(TARGET)
-        self._says_face = self.say(FACE)
-        self._says_face_image = self.say(FACE_IMAGE)
-        self._says_annotated = self.say(IMAGE_ANNOTATED)
+        self._says_detections = self.create_topic_publisher(DETECTIONS)
+        self._says_target = self.create_topic_publisher(TARGET)
+        self._says_face = self.create_topic_publisher(FACE)
+        self._says_face_image = self.create_topic_publisher(FACE_IMAGE)
+        self._says_annotated = self.create_topic_publisher(IMAGE_ANNOTATED)
         image_topic = IMAGE_COMPRESSED if self._input.compressed else IMAGE
         silent_after_s = self._input.silent_after_s
-        self.hear(CAMERA_INFO, self._on_camera_info, silent_after_s)
-        self.hear(JOINT_STATES, self._on_joint_states, silent_after_s)
-        self.hear(image_topic, self._on_image, silent_after_s)
+        self.subscribe(CAMERA_INFO, self._on_camera_info, silent_after_s)
+        self.subscribe(JOINT_STATES, self._on_joint_states, silent_after_s)
+        self.subscribe(image_topic, self._on_image, silent_after_s)
         # Wall time: it is for the case that the other messages do not come.
         self.create_timer(0.1, self._see_ready, clock=Clock(clock_type=ClockType.STEADY_TIME))
 

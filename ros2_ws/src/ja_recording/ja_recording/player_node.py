@@ -51,7 +51,7 @@ class PlayerNode(GraphNode):
         self._makes_clock = CLOCK.name not in chosen
         self._said = {topic.name: self._publisher(topic) for topic in chosen.values()}
         if self._makes_clock:
-            self._clock_publisher = self.say(CLOCK)
+            self._clock_publisher = self.create_topic_publisher(CLOCK)
         self._messages = self.recording.messages(set(chosen))
         self._next: RecordedMessage | None = next(self._messages, None)
         self._began_s = time.monotonic() + config.start_after_s
@@ -72,7 +72,9 @@ class PlayerNode(GraphNode):
     def _publisher(self, topic: RecordedTopic) -> Any:
         qos = profile_of(topic.offered_qos)
         kind = message_class(topic.type_name)
-        return self.say(Topic(topic.name, kind, 'recorded', says=qos, hears=qos))
+        return self.create_topic_publisher(
+            Topic(topic.name, kind, 'recorded', publisher_qos=qos, subscriber_qos=qos)
+        )
 
     def _play(self) -> None:
         now_ns = self.recording.first_ns + int(self.position_s * 1e9)

@@ -81,7 +81,7 @@ def recorded_trials(
         raise ConfigError(f'the recording lacks {", ".join(lacking)}: nothing to learn from')
     node = importlib.import_module('ja_learning.learning_module_node')
     with driven(node.LearningModuleNode, ['-p', 'lockstep:=true', *arguments]) as learner:
-        witness = _Witness(learner)
+        witness = TrialExtractor(learner)
         ours = {f'/{topic.name}' for topic in (SIM_TRUTH, GATE_STATUS)}
         for message in recording.messages(learner.hears | ours):
             yield from witness.hear(message.topic.name.lstrip('/'), message)
@@ -97,14 +97,14 @@ class _Look:
     truth: TruthAt | None
 
 
-class _Witness:
+class TrialExtractor:
     """Follows a driven learner through a recording; it alone looks at the truth."""
 
     def __init__(self, learner: DrivenNode) -> None:
         self._learner = learner
         self._teach = learner.node.teach
         self._taught: list[tuple[Trial, int]] = []
-        learner.node.teach = self._overhear
+        learner.node.teach = self._on_lesson_callback
         value = learner.node.get_parameter
         names = [field.name for field in fields(JointConfig)]
         self._joints = JointCodec(JointConfig(**{name: value(name).value for name in names}))
@@ -135,7 +135,7 @@ class _Witness:
             if trial is not None:
                 yield trial
 
-    def _overhear(self, lesson: Trial, stamp_ns: int) -> None:
+    def _on_lesson_callback(self, lesson: Trial, stamp_ns: int) -> None:
         self._taught.append((lesson, stamp_ns))
         self._teach(lesson, stamp_ns)
 

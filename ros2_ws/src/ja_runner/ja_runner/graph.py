@@ -123,7 +123,7 @@ def sim_graph(
     for two images, and only a third is a fixation.
     """
     sim = {'seed': seed, **(sim_parameters or {})}
-    graph = [*_mind(seed), NodeSpec('ja_sim', 'scorer'), NodeSpec('ja_sim', 'sim', sim)]
+    graph = [*_attention_nodes(seed), NodeSpec('ja_sim', 'scorer'), NodeSpec('ja_sim', 'sim', sim)]
     presets = [f'demo_{learner}.yaml', 'demo.yaml']
     if sim.get('draw_ahead') and learner == 'gaze_line':
         presets.insert(0, 'demo_gaze_line_ahead.yaml')
@@ -139,7 +139,7 @@ def rig_graph(source: str | None = None, seed: int = 0) -> list[NodeSpec]:
     that picture. Without one, the rig's own drivers publish `image_raw` and `joint_states`, and
     obey `joint_commands`.
     """
-    graph = _mind(seed)
+    graph = _attention_nodes(seed)
     if source is not None:
         wide = {name: f'wide/{name}' for name in ('image_raw', 'camera_info')}
         graph += [
@@ -149,7 +149,7 @@ def rig_graph(source: str | None = None, seed: int = 0) -> list[NodeSpec]:
     return _configured(CONFIG / 'rig.yaml', graph)
 
 
-def _mind(seed: int) -> list[NodeSpec]:
+def _attention_nodes(seed: int) -> list[NodeSpec]:
     """What looks, learns and moves, whatever the head and the camera are."""
     return [
         NodeSpec('ja_perception', 'salient_feature_detector'),

@@ -8,7 +8,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from ja_common.core.config import ConfigError
-from ja_common.executor import KeptWaitSetExecutor
+from ja_common.executor import CachedWaitSetExecutor
 from ja_runner.graph import NodeSpec
 
 
@@ -24,7 +24,7 @@ def run_in_one_process(
     """
     context = Context()
     rclpy.init(args=[], context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-    executor = KeptWaitSetExecutor(context=context)
+    executor = CachedWaitSetExecutor(context=context)
     stop = _Stop()
     nodes: list[Node] = []
     try:

@@ -33,9 +33,9 @@ class ProgressNode(GraphNode):
         self.objects = 1
         self.began_s = math.nan
         self._image_times_s: deque[float] = deque(maxlen=200)
-        self.hear(GATE_STATUS, self._on_gate_status)
-        self.hear(EVERY_SCORE, self._on_score)
-        self.hear(DIAGNOSTICS, self._on_diagnostics)
+        self.subscribe(GATE_STATUS, self._on_gate_status)
+        self.subscribe(EVERY_SCORE, self._on_score)
+        self.subscribe(DIAGNOSTICS, self._on_diagnostics)
 
     @property
     def elapsed_s(self) -> float:

@@ -32,11 +32,11 @@ class DigitalHeadNode(GraphNode):
         self._frame_id = self.configure(FrameConfig).frame_id
         self._joints = JointCodec(self.configure(JointConfig))
         self._head = DigitalHead(self._config)
-        self._says_joints = self.say(JOINT_STATES)
-        self._says_info = self.say(CAMERA_INFO)
-        self._says_image = self.say(IMAGE)
-        self.hear(JOINT_COMMANDS, self._on_command)
-        self.hear(WIDE_IMAGE, self._on_wide_image, expected_every_s=2.0)
+        self._says_joints = self.create_topic_publisher(JOINT_STATES)
+        self._says_info = self.create_topic_publisher(CAMERA_INFO)
+        self._says_image = self.create_topic_publisher(IMAGE)
+        self.subscribe(JOINT_COMMANDS, self._on_command)
+        self.subscribe(WIDE_IMAGE, self._on_wide_image, expected_every_s=2.0)
 
     def _on_command(self, message: JointState) -> None:
         posture = self._joints.decode_posture(message)

@@ -42,11 +42,11 @@ class ScorerNode(GraphNode):
         self._joints = JointCodec(self.configure(JointConfig))
         self._score = Score(self._config.window_trials)
         self._join = StampJoin([SIM_TRUTH.name, FIXATION.name])
-        self.hear(SIM_TRUTH, self._on_truth, expected_every_s=2.0)
-        self.hear(FIXATION, self._on_fixation, expected_every_s=2.0)
-        self._success_rate = self.say(SUCCESS_RATE)
-        self._details = self.say(SCORE)
-        self.offer(Trigger, 'sim/reset_score', self._on_reset)
+        self.subscribe(SIM_TRUTH, self._on_truth, expected_every_s=2.0)
+        self.subscribe(FIXATION, self._on_fixation, expected_every_s=2.0)
+        self._success_rate = self.create_topic_publisher(SUCCESS_RATE)
+        self._details = self.create_topic_publisher(SCORE)
+        self.advertise_service(Trigger, 'sim/reset_score', self._on_reset)
         self._csv_file = self._open_csv(self._config.csv_file)
 
     def destroy_node(self) -> None:

@@ -98,20 +98,20 @@ class SimNode(GraphNode):
         self._live = self.configure(LiveConfig, self._on_live_config)
         self._joints = JointCodec(self.configure(JointConfig))
         # An OpenGL context belongs to one thread: this one makes the worlds and draws them.
-        self._studio, self._closed = ThreadPoolExecutor(1, 'studio'), False
+        self._render_thread, self._closed = ThreadPoolExecutor(1, 'studio'), False
         self._world = self._in_studio(self._make_world, self._live.objects)
         # The world's time starts at nought after a reset; the time of the graph never goes back.
         self._time_offset_ns = 0
-        self.hear(JOINT_COMMANDS, self._on_command, expected_every_s=2.0)
-        self._simulated_time = self.say(CLOCK)
-        self._truth = self.say(SIM_TRUTH)
-        self._joint_states = self.say(JOINT_STATES)
-        self._camera_info = self.say(CAMERA_INFO)
-        self._image = self.say(IMAGE)
-        self.offer(Trigger, 'sim/reset', self._on_reset)
-        self.offer(SetBool, 'sim/pause', self._on_pause)
-        self.offer(Trigger, 'sim/step', self._on_step)
-        self.offer(Trigger, 'sim/rearrange', self._on_rearrange)
+        self.subscribe(JOINT_COMMANDS, self._on_command, expected_every_s=2.0)
+        self._simulated_time = self.create_topic_publisher(CLOCK)
+        self._truth = self.create_topic_publisher(SIM_TRUTH)
+        self._joint_states = self.create_topic_publisher(JOINT_STATES)
+        self._camera_info = self.create_topic_publisher(CAMERA_INFO)
+        self._image = self.create_topic_publisher(IMAGE)
+        self.advertise_service(Trigger, 'sim/reset', self._on_reset)
+        self.advertise_service(SetBool, 'sim/pause', self._on_pause)
+        self.advertise_service(Trigger, 'sim/step', self._on_step)
+        self.advertise_service(Trigger, 'sim/rearrange', self._on_rearrange)
 
         self._command: NDArray[np.float64] | None = None
         self._was_answered = False
@@ -130,7 +130,7 @@ class SimNode(GraphNode):
         if not self._closed:
             self._closed = True
             self._in_studio(self._world.close)
-            self._studio.shutdown()
+            self._render_thread.shutdown()
         super().destroy_node()
 
     def _on_command(self, message: JointState) -> None:
@@ -166,10 +166,10 @@ class SimNode(GraphNode):
     def _draw(self) -> Future[_Round]:
         """Begin the next round, in which the head follows the newest command."""
         command, self._command = self._command, None
-        return self._studio.submit(self._advance, command)
+        return self._render_thread.submit(self._advance, command)
 
     def _in_studio(self, work: Callable[..., _T], *args: Any) -> _T:
-        return self._studio.submit(work, *args).result()
+        return self._render_thread.submit(work, *args).result()
 
     def _resend(self) -> None:
         """In lockstep, as a message may be lost; while time stands still, so that nobody stops."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from ja_benchmarks.benchmarks.learning_speed import LOOKS
 from ja_benchmarks.rows import Row, success_row
-from ja_experiments.agents.trial_loop import Life
+from ja_experiments.agents.trial_loop import TrialLoop
 from ja_experiments.config import ExperimentConfig
 from ja_experiments.datasets.looks import load_looks
 from ja_experiments.processes import side_by_side
@@ -66,7 +66,7 @@ def live(settings: dict[str, Any], top_down: bool, seed: int, change: str = '') 
     config = ExperimentConfig().with_settings({**_BASE, **settings})
     learner = GazeLineLearner(GazeLineConfig(top_down=top_down), seed)
     looks = load_looks('default', seed, LOOKS)
-    life = Life(config, load_scene('default').objects, looks, learner, seed)
+    life = TrialLoop(config, load_scene('default').objects, looks, learner, seed)
     before = life.run(BEFORE_CHANGE).success
     if change == 'mirrored':
         life.move_to(replace(looks, faces=np.ascontiguousarray(looks.faces[:, :, ::-1])))

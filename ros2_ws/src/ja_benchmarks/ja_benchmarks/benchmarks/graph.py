@@ -92,7 +92,7 @@ class _Stopwatch:
         if not self._hearing:
             self._hearing = True
             for topic in (IMAGE, *HOPS):
-                node.hear(topic, self._noter(topic.name))
+                node.subscribe(topic, self._noter(topic.name))
         return node.elapsed_s > WARM_UP_S + MEASURE_S
 
     def _noter(self, name: str) -> Callable[[Any], None]:

@@ -32,7 +32,7 @@ from ja_common.graph_node import GraphNode
 from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.private_executor import own_executor
-from ja_common.realtime import go_back_among_all, go_before_all_else
+from ja_common.realtime import enable_realtime_scheduling, go_back_among_all
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_common.status_values import status_values
 from ja_common.time_codec import to_ns, to_time
@@ -106,13 +106,13 @@ class _Watch(GraphNode):
         self._random = np.random.default_rng(0)
         self._joints = JointCodec(JointConfig())
         said = (JOINT_STATES, FACE_IMAGE, DETECTIONS, FIXATION)
-        self._say = {topic: self.say(topic) for topic in said}
+        self._say = {topic: self.create_topic_publisher(topic) for topic in said}
         self._answered: tuple[int, float] = (0, 0.0)
         self.delays_ms: list[float] = []
         self.trials = self.waiting = 0
         self.priority = ''
-        self.hear(LM_DELTA, self._on_delta)
-        self.hear(DIAGNOSTICS, self._on_diagnostics)
+        self.subscribe(LM_DELTA, self._on_delta)
+        self.subscribe(DIAGNOSTICS, self._on_diagnostics)
 
     def story(self) -> Iterator[str]:
         """The measurement in steps; the caller spins between them."""
@@ -170,7 +170,7 @@ class _Watch(GraphNode):
 
 def _go_before_the_learner() -> None:
     try:
-        go_before_all_else(WATCH_PRIORITY)
+        enable_realtime_scheduling(WATCH_PRIORITY)
     except OSError as error:
         print(f'how late the watch is itself is measured too: {error}', file=sys.stderr)
 

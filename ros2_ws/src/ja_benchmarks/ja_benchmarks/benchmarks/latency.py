@@ -83,7 +83,7 @@ class Stopwatch:
             said = self._said_ns[to_ns(message.header.stamp)]
             said.setdefault(topic.name, information['source_timestamp'])
 
-        node.create_subscription(topic.type, topic.name, note, topic.hears)
+        node.create_subscription(topic.type, topic.name, note, topic.subscriber_qos)
 
     def rows(self) -> dict[str, Row]:
         """The figures; pictures without a command (the head was held) are counted apart."""

@@ -52,7 +52,7 @@ class Health:
         """Watch an input; silence for longer than `every_s` is a WARN (None: never)."""
         self._inputs[name] = _Input(every_s)
 
-    def heard(self, name: str, now_s: float) -> None:
+    def record_message(self, name: str, now_s: float) -> None:
         """An input spoke."""
         entry = self._inputs[name]
         entry.heard += 1

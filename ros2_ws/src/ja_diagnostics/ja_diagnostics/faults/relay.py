@@ -36,10 +36,10 @@ class Relay(GraphNode):
         self._publishers_of: dict[Topic, Publisher] = {}
         for topic in HEAD_SAYS:
             self._disturbances[topic] = Disturbance()
-            self._publishers_of[topic] = self.say(topic)
+            self._publishers_of[topic] = self.create_topic_publisher(topic)
             # Everything is heard: what is lost here would be a fault that nobody asked for.
-            heard = replace(topic, name=_undisturbed(topic), hears=topic.says)
-            self.hear(heard, self._putter(topic))
+            heard = replace(topic, name=_undisturbed(topic), subscriber_qos=topic.publisher_qos)
+            self.subscribe(heard, self._putter(topic))
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(_PERIOD_S, self._pass_on, clock=steady)
 

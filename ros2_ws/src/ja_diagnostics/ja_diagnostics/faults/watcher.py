@@ -27,9 +27,9 @@ class Watcher(GraphNode):
         self.trials = 0
         self.learned = 0
         self._position: np.ndarray | None = None
-        self.hear(JOINT_COMMANDS, self._on_command)
-        self.hear(GATE_STATUS, self._on_status)
-        self.hear(DIAGNOSTICS, self._on_diagnostics)
+        self.subscribe(JOINT_COMMANDS, self._on_command)
+        self.subscribe(GATE_STATUS, self._on_status)
+        self.subscribe(DIAGNOSTICS, self._on_diagnostics)
 
     def watch_pauses(self) -> None:
         """From now on: the longest time without a decision, and when the next decision comes."""

@@ -12,7 +12,7 @@ from ja_common.core.detection import most_salient
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_common.core.stamps import NS_PER_S
 from ja_control.core.visual_feedback import visual_feedback
-from ja_experiments.agents.robot import Learner, Pupil
+from ja_experiments.agents.robot import Learner, OnlineLearner
 from ja_learning.core.evaluator import EvaluatorConfig
 from ja_learning.core.look_around import LookAroundConfig
 from ja_perception.core.blazeface import BlazeFace
@@ -29,7 +29,7 @@ class GymAgent:
         self.p_lm = p_lm
         self._rng = np.random.default_rng(seed)
         self._detector = SalientFeatureDetector(BlazeFace())
-        self._pupil = Pupil(
+        self._online_learner = OnlineLearner(
             learner, LookAroundConfig(), EvaluatorConfig(), STILL_BELOW_RAD_S, seed
         )
         self._stamp_ns = 0
@@ -42,7 +42,7 @@ class GymAgent:
         image = observation['image']
         camera = CameraModel(image.shape[1], image.shape[0], *info['camera'])
         percept = self._detector.look(image, self._stamp_ns, camera, posture)
-        proposal, _ = self._pupil.live(percept.detections, percept.face_image, posture)
+        proposal, _ = self._online_learner.live(percept.detections, percept.face_image, posture)
         if proposal.delta is not None and self._rng.random() < self.p_lm:
             return proposal.delta
         salient = most_salient(percept.detections)

@@ -56,7 +56,7 @@ class FixedTurn:
         pass
 
 
-class Pupil:
+class OnlineLearner:
     """A learner that lives: asked on every image, and taught the trials that it makes of them.
 
     `taught`: as in `TaskConfig`.
@@ -118,7 +118,7 @@ class Robot:
         self._config = config
         self._cycle = AttentionCycle(config.cycle, Gating(config.gating), rng)
         self._limits = JointLimits(config.limits)
-        self._pupil = Pupil(
+        self._online_learner = OnlineLearner(
             learner,
             config.look_around,
             config.evaluator,
@@ -131,7 +131,7 @@ class Robot:
         self, detections: list[Detection], face: NDArray[np.uint8] | None, posture: Posture
     ) -> Step:
         """One image, as detections and the picture of the attended `face`, uint8 (30, 25)."""
-        proposal, fixation = self._pupil.live(detections, face, posture)
+        proposal, fixation = self._online_learner.live(detections, face, posture)
         percept = Percept(
             posture,
             face_delta=self._feedback(caregiver_face(detections)),

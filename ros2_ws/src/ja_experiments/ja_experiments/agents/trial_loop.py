@@ -21,8 +21,8 @@ from ja_sim.core.specs import ObjectsSpec
 _OF_A_TRIAL = (Phase.GLANCE, Phase.SHIFT)
 
 
-class Life:
-    """One robot, from untaught on.
+class TrialLoop:
+    """One robot, from untrained on.
 
     `p_lm`: of every trial so far, the probability with which the gate followed the learner.
     `images`: how many were taken.

@@ -89,7 +89,7 @@ class _Weights(NamedTuple):
 
 
 class FastExperiment:
-    """One robot, from untaught on; drop-in for `ReferenceExperiment`, without the GIL."""
+    """One robot, from untrained on; drop-in for `ReferenceExperiment`, without the GIL."""
 
     def __init__(
         self, config: ExperimentConfig, places: ObjectsSpec, looks: Looks, seed: int

@@ -5,14 +5,14 @@ This is the readable version; `kernel.py` computes the same, several hundred tim
 
 from __future__ import annotations
 
-from ja_experiments.agents.trial_loop import Life
+from ja_experiments.agents.trial_loop import TrialLoop
 from ja_experiments.config import ExperimentConfig
 from ja_experiments.datasets.looks import Looks
 from ja_learning.core.network import ThreeLayerNetwork
 from ja_sim.core.specs import ObjectsSpec
 
 
-class ReferenceExperiment(Life):
+class ReferenceExperiment(TrialLoop):
     """The life of a robot with the paper's network, which is `network`."""
 
     def __init__(

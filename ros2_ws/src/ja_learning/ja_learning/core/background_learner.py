@@ -33,7 +33,7 @@ class BackgroundLearner:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix='learner', initializer=begins)
         self._lessons: deque[Future[Predictor]] = deque()
         self._predictor: Predictor = learner.snapshot()
-        self._troubles: deque[Exception] = deque()
+        self._errors: deque[Exception] = deque()
         self.trials = learner.trials
         """Trials handed over, those that are still to be learned included."""
 
@@ -54,9 +54,9 @@ class BackgroundLearner:
         self.trials += 1
         self._lessons.append(self._thread.submit(self._learn, trial))
 
-    def troubles(self) -> list[Exception]:
+    def pop_errors(self) -> list[Exception]:
         """What went wrong in lessons since the last call, in `learned` too."""
-        return [self._troubles.popleft() for _ in range(len(self._troubles))]
+        return [self._errors.popleft() for _ in range(len(self._errors))]
 
     def ask(self, question: Callable[[Learner], Answer]) -> Answer:
         """The answer of the learner itself when all is learned; waits for it.
@@ -82,6 +82,6 @@ class BackgroundLearner:
         try:
             self._learner.learn(trial)
             self._learned(self._learner)
-        except Exception as error:  # it belongs to who asks for troubles
-            self._troubles.append(error)
+        except Exception as error:  # it belongs to who asks for pop_errors
+            self._errors.append(error)
         return self._learner.snapshot()

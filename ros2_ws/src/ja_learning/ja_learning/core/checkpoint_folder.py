@@ -33,7 +33,7 @@ class CheckpointConfig:
     resume: bool = parameter(True, 'go on from the newest good checkpoint in the folder')
 
 
-class TakenUp(NamedTuple):
+class Resumed(NamedTuple):
     """The checkpoint that a learner continues from (None: there was none), and why not others."""
 
     path: Path | None
@@ -92,11 +92,11 @@ class CheckpointFolder:
         if learner.trials != self._saved_trials:
             self.save(learner)
 
-    def take_up(self, learner: Learner) -> TakenUp:
+    def resume_into(self, learner: Learner) -> Resumed:
         """Restore the newest checkpoint that is whole and of this learner's configuration.
 
         Raises ConfigError, and changes nothing, when there are checkpoints and none can be used:
-        an untaught learner must not stand unnoticed in the place of a taught one.
+        an untrained learner must not stand unnoticed in the place of a taught one.
         """
         refused = []
         for path in self._newest_first():
@@ -106,13 +106,13 @@ class CheckpointFolder:
                 refused.append(str(error))
             else:
                 self._saved_trials = learner.trials
-                return TakenUp(path, refused)
+                return Resumed(path, refused)
         if refused:
             raise ConfigError(
                 f'none of the {len(refused)} checkpoints in {self.folder} can be used; the newest:'
                 f' {refused[0]}: mend that, or name another folder'
             )
-        return TakenUp(None, refused)
+        return Resumed(None, refused)
 
     def _newest_first(self) -> list[Path]:
         found = [path for path in self.folder.glob('*.npz') if _NAME.fullmatch(path.name)]

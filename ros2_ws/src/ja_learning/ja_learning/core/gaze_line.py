@@ -41,10 +41,10 @@ from ja_learning.core.trial import FACE_SHAPE, Trial
 # The likelihood is at full strength after so many trials for every pair of candidates: the more
 # there are, the later one may be told from another.
 _HASTIEST, _SLOWEST = 0.25, 2.0
-_COLDNESS_AT_FIRST = 0.1
+_INITIAL_INVERSE_TEMPERATURE = 0.1
 # With how many places, seen in other trials, those of a trial are compared: to learn, anew in each
 # step; to weigh it, once, where what is due to their choice would be taken for evidence.
-_ELSEWHERE_TO_LEARN, _ELSEWHERE_TO_WEIGH = 64, 256
+_TRAINING_NEGATIVES, _WEIGHING_NEGATIVES = 64, 256
 # How differently a face is replayed: its size (a share), its place, its pixels (in deviations).
 _VARIED_SIZE, _VARIED_PLACE_PIXELS, _VARIED_LIGHT = 0.1, 1.0, 0.3
 _COMPARED_EVERY_TRIALS = 10
@@ -156,9 +156,9 @@ class GazeLineLearner:
         self._memory.add(trial.face, places)
         if changed:
             self._begin_anew(self._alarm.doubtful_trials)
-        coldness = self._coldness()
+        inverse_temperature = self._inverse_temperature()
         for _ in range(self.config.replay_steps):
-            self._step(coldness)
+            self._step(inverse_temperature)
         if self.trials % _COMPARED_EVERY_TRIALS == 0:
             self._replace_the_beaten()
 
@@ -173,7 +173,7 @@ class GazeLineLearner:
             with torch.no_grad():
                 gaze = self._mean.gaze(standardised(faces[:, None]))
                 seen = torch.from_numpy(places)[None, None]
-                elsewhere = self._elsewhere(_ELSEWHERE_TO_WEIGH)
+                elsewhere = self._elsewhere(_WEIGHING_NEGATIVES)
                 ratio = self._mean.log_ratio(gaze, seen, elsewhere)
             # That one of them was meant; which, is not known.
             of_members = torch.logsumexp(ratio, dim=-1).numpy().astype(float)
@@ -184,7 +184,7 @@ class GazeLineLearner:
         log_ratio = float(self._evidence.weigh(face, log_probability)[-1])
         return self._alarm.raised_by(log_ratio, knew)
 
-    def _step(self, coldness: torch.Tensor) -> None:
+    def _step(self, inverse_temperature: torch.Tensor) -> None:
         members, known = self.config.members, len(self._memory)
         count = min(self.config.replay_batch, known)
         # Each member replays its own choice, so that they differ; the newest trial always.
@@ -192,11 +192,13 @@ class GazeLineLearner:
         ages[0] = 0
         faces, places = self._memory.at(ages)
         loss = self._loss(
-            self._varied(standardised(faces)), torch.from_numpy(places).transpose(0, 1), coldness
+            self._varied(standardised(faces)),
+            torch.from_numpy(places).transpose(0, 1),
+            inverse_temperature,
         )
         self._optimiser.zero_grad()
         loss.backward()
-        self._hold_origins(coldness)
+        self._hold_origins(inverse_temperature)
         self._optimiser.step()
         self._steps += 1
         keep = min(0.995, 1 - 1 / (self._steps / 10 + 1))
@@ -204,11 +206,11 @@ class GazeLineLearner:
             now = list(self._network.parameters())
             torch._foreach_lerp_(list(self._mean.parameters()), now, 1 - keep)
 
-    def _hold_origins(self, coldness: torch.Tensor) -> None:
+    def _hold_origins(self, inverse_temperature: torch.Tensor) -> None:
         """Where a line begins would follow wrong guesses, while all candidates count alike."""
         slope = self._network.origin_tilt.grad
         if slope is not None:
-            slope[coldness < 1.0] = 0.0
+            slope[inverse_temperature < 1.0] = 0.0
 
     def _varied(self, faces: torch.Tensor) -> torch.Tensor:
         """Each of faces (n, members, 30, 25) a little otherwise, as another look would show it.
@@ -239,28 +241,30 @@ class GazeLineLearner:
         return torch.from_numpy(places).transpose(0, 1)
 
     def _loss(
-        self, faces: torch.Tensor, places: torch.Tensor, coldness: torch.Tensor
+        self, faces: torch.Tensor, places: torch.Tensor, inverse_temperature: torch.Tensor
     ) -> torch.Tensor:
         """Minus the tempered log likelihood that one of the candidates, or none, was meant."""
         counts = (~torch.isnan(places[..., 0])).sum(-1, keepdim=True)
-        coldness = coldness[:, None, None]
-        elsewhere = self._elsewhere(_ELSEWHERE_TO_LEARN)
+        inverse_temperature = inverse_temperature[:, None, None]
+        elsewhere = self._elsewhere(_TRAINING_NEGATIVES)
         ratio = self._network.log_ratio(self._network.gaze(faces), places, elsewhere)
         none = self.config.none_was_meant
-        one = coldness * ratio + np.log1p(-none) - torch.log(counts)
+        one = inverse_temperature * ratio + np.log1p(-none) - torch.log(counts)
         # If none was meant, places are what they are elsewhere: a ratio of 1.
-        nothing = (coldness * np.log(none)).expand(-1, len(faces), -1)
+        nothing = (inverse_temperature * np.log(none)).expand(-1, len(faces), -1)
         tempered = torch.cat([one, nothing], dim=-1)
         # A sum over members, as none of them depends on another.
-        return -(torch.logsumexp(tempered, dim=-1) / coldness[..., 0]).mean(dim=1).sum()
+        return -(torch.logsumexp(tempered, dim=-1) / inverse_temperature[..., 0]).mean(dim=1).sum()
 
-    def _coldness(self) -> torch.Tensor:
+    def _inverse_temperature(self) -> torch.Tensor:
         """Of each member, from 0.1, where all candidates count nearly alike, to 1."""
         typical = float(np.mean(self._memory.counts(50)))
         lived = np.maximum(len(self._memory) - self._began, 0)
         cooled = lived / (self._annealing * max(typical, 1.0) ** 2)
-        coldness = np.minimum(1.0, _COLDNESS_AT_FIRST + (1 - _COLDNESS_AT_FIRST) * cooled)
-        return torch.from_numpy(coldness.astype(np.float32))
+        inverse_temperature = np.minimum(
+            1.0, _INITIAL_INVERSE_TEMPERATURE + (1 - _INITIAL_INVERSE_TEMPERATURE) * cooled
+        )
+        return torch.from_numpy(inverse_temperature.astype(np.float32))
 
     def _begin_anew(self, newest: int) -> None:
         """Keep only so many newest trials; every second member forgets all that it knows."""

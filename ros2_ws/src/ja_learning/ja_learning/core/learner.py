@@ -75,7 +75,7 @@ class LearnerChoice:
 
     learner: str = parameter(
         ThreeLayerNetwork.kind,
-        "the paper's network, or the fast one of lines of gaze; a change starts untaught",
+        "the paper's network, or the fast one of lines of gaze; a change starts untrained",
         choices=(ThreeLayerNetwork.kind, GazeLineLearner.kind),
     )
 
@@ -83,7 +83,7 @@ class LearnerChoice:
 def make_learner(
     choice: LearnerChoice, network: NetworkConfig, gaze_line: GazeLineConfig, seed: int
 ) -> Learner:
-    """An untaught learner."""
+    """An untrained learner."""
     if choice.learner == GazeLineLearner.kind:
         return GazeLineLearner(gaze_line, seed)
     return ThreeLayerNetwork(network, seed)

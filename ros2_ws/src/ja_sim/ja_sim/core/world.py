@@ -124,7 +124,7 @@ class JointAttentionWorld:
         self._blinking = Blinking(self.scene.caregiver.blink_rate_hz, blinks)
         self._attended, self._elsewhere, self._in_view = ROBOT, np.zeros(3), False
         self._turned_s = 0.0
-        self._film: deque[_View] = deque([self._view()])
+        self._frame_buffer: deque[_View] = deque([self._view()])
         self._observation: Observation | None = None
         self._sample = self._head.read_encoders(self._now_ns, self._encoder_rng)
 
@@ -156,19 +156,19 @@ class JointAttentionWorld:
             while (exposure_ns := START_NS + round(frame / rate * 1e9)) <= end_ns:
                 if exposure_ns > self._now_ns:
                     self._advance_to(exposure_ns)
-                    self._film.append(self._view())
+                    self._frame_buffer.append(self._view())
                 frame += 1
         self._advance_to(end_ns)
         if not rate:
-            self._film.append(self._view())
+            self._frame_buffer.append(self._view())
         seen_ns = end_ns - round(self.scene.head.camera_latency_s * 1e9)
-        while len(self._film) > 1 and self._film[1].truth.stamp_ns <= seen_ns:
-            self._film.popleft()
+        while len(self._frame_buffer) > 1 and self._frame_buffer[1].truth.stamp_ns <= seen_ns:
+            self._frame_buffer.popleft()
         self._sample = self._head.read_encoders(self._now_ns, self._encoder_rng)
 
     def observe(self) -> Observation:
         """The newest picture that has left the camera; its stamp is the time of exposure."""
-        view = self._film[0]
+        view = self._frame_buffer[0]
         stamp_ns = view.truth.stamp_ns
         if self._observation is None or self._observation.stamp_ns != stamp_ns:
             sharp = self._draw(view)
@@ -217,7 +217,7 @@ class JointAttentionWorld:
 
     def truth_at_exposure(self) -> Truth:
         """How things were when the picture was taken that `observe` gives; for the scorer only."""
-        return self._film[0].truth
+        return self._frame_buffer[0].truth
 
     def close(self) -> None:
         """Free the graphics context."""

@@ -4,7 +4,7 @@ from itertools import permutations
 
 import pytest
 
-from ja_common.core.turns import Turns
+from ja_common.core.stamp_ordered_dispatcher import StampOrderedDispatcher
 
 
 class Acted(list):
@@ -12,7 +12,7 @@ class Acted(list):
 
     def __init__(self) -> None:
         super().__init__()
-        self._turns = Turns(['a', 'b'])
+        self._turns = StampOrderedDispatcher(['a', 'b'])
 
     def add(self, kind: str, stamp: int) -> None:
         self._turns.add(kind, stamp, lambda: self.append(f'{kind}{stamp}'))

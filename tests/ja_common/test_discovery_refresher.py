@@ -2,7 +2,7 @@
 
 import pytest
 
-from ja_common.presence import Presence
+from ja_common.discovery_refresher import DiscoveryRefresher
 from ja_common.ros_defaults import LEASE_S
 
 
@@ -28,7 +28,7 @@ class FakeNode:
 
 def test_it_introduces_itself_only_after_a_halt_that_others_take_for_its_end():
     node = FakeNode('me', 'you')
-    presence = Presence(node)
+    presence = DiscoveryRefresher(node)
     assert presence.refresh(11.0) == 0.0, 'how long it took to begin is no halt'
     assert presence.refresh(11.0 + 0.9 * LEASE_S) == 0.0
     assert node.introduced == 0
@@ -40,7 +40,7 @@ def test_it_introduces_itself_only_after_a_halt_that_others_take_for_its_end():
 
 def test_it_introduces_itself_to_one_that_returns():
     node = FakeNode('me')
-    presence = Presence(node)
+    presence = DiscoveryRefresher(node)
     for second, names, introduced in (
         (1, ['me', 'you'], 0),  # new here: DDS tells it by itself
         (2, ['me'], 0),

@@ -8,7 +8,7 @@ from std_srvs.srv import Trigger
 
 from ja_common.core.health import Level
 from ja_common.graph_node import GraphNode
-from ja_common.realtime import go_as_any_program
+from ja_common.realtime import use_default_scheduling
 from ja_learning.core.background_learner import BackgroundLearner
 from ja_learning.core.checkpoint_folder import CheckpointConfig, CheckpointFolder
 from ja_learning.core.learner import Learner, Predictor
@@ -24,14 +24,14 @@ CLOSING_S = 1.0
 """So long may learning go on when the node is asked to end [s]; then comes the last checkpoint."""
 
 
-class KeptLearner:
+class PersistentLearner:
     """Goes on from the newest good checkpoint, saves itself as it goes, and when it is closed.
 
     Offers the services `save_checkpoint` and `load_checkpoint`, and reports to the node's health.
     """
 
     def __init__(self, node: GraphNode, make: Callable[[], Learner], lockstep: bool) -> None:
-        """`make` gives an untaught learner. `lockstep`: what is believed depends on no clock.
+        """`make` gives an untrained learner. `lockstep`: what is believed depends on no clock.
 
         Raises ConfigError or OSError when the checkpoints cannot be used.
         """
@@ -41,11 +41,11 @@ class KeptLearner:
         self._checkpoints = self._open(node.configure(CheckpointConfig))
         learner = make()
         if self._checkpoints is not None and self._checkpoints.config.resume:
-            self._take_up(learner)
+            self._resume(learner)
         self._lessons = self._at_work(learner)
         self.tell()
-        node.offer(Trigger, 'save_checkpoint', self._on_save)
-        node.offer(Trigger, 'load_checkpoint', self._on_load)
+        node.advertise_service(Trigger, 'save_checkpoint', self._on_save)
+        node.advertise_service(Trigger, 'load_checkpoint', self._on_load)
 
     @property
     def predictor(self) -> Predictor:
@@ -72,7 +72,7 @@ class KeptLearner:
         waiting = self._lessons.waiting
         self._node.health.values['trials learned'] = str(self._lessons.trials)
         self._node.health.values['of these still waiting'] = str(waiting)
-        for error in self._lessons.troubles():
+        for error in self._lessons.pop_errors():
             self._node.problem('learning', f'learning: {error}')
         if waiting > MANY_WAITING:
             text = f'more than {MANY_WAITING} trials wait to be learned: replay less after each'
@@ -99,7 +99,7 @@ class KeptLearner:
 
     def _at_work(self, learner: Learner) -> BackgroundLearner:
         # A lesson is not urgent, even where answers are (`realtime_priority`).
-        return BackgroundLearner(learner, self._after_lesson, self._behind, go_as_any_program)
+        return BackgroundLearner(learner, self._after_lesson, self._behind, use_default_scheduling)
 
     def _replace(self, learner: Learner) -> None:
         self._lessons.close(0.0)
@@ -116,8 +116,8 @@ class KeptLearner:
             raise ValueError('the parameter checkpoint_folder is empty: no place for checkpoints')
         return self._checkpoints
 
-    def _take_up(self, learner: Learner) -> Path | None:
-        path, refused = self._kept_in().take_up(learner)
+    def _resume(self, learner: Learner) -> Path | None:
+        path, refused = self._kept_in().resume_into(learner)
         for text in refused:
             self._node.problem('checkpoints', f'refused: {text}', Level.WARN)
         if path is not None:
@@ -132,7 +132,7 @@ class KeptLearner:
 
     def _on_load(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         learner = self._make()
-        path = self._take_up(learner)
+        path = self._resume(learner)
         if path is None:
             raise ValueError(f'no checkpoint in {self._kept_in().folder}')
         self._replace(learner)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 Action = Callable[[], None]
 
 
-class Turns:
+class StampOrderedDispatcher:
     """For every image the kinds of messages act in turn, and only then those of the next image.
 
     Messages of several publishers arrive in any order, even an answer before its question: the

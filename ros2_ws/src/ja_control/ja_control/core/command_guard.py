@@ -1,4 +1,4 @@
-"""The border between deciding and moving: what passes is safe, what is missing holds the head.
+"""The guard between deciding and moving: what passes is safe, what is missing holds the head.
 
 In this order: an aim must be finite; what was heard must be fresh; aims within the dead zone of
 the last one are the last one; the motion profile limits speed and acceleration, relative to the
@@ -25,7 +25,7 @@ _PROGRESS_RAD = 0.02
 
 
 @dataclass(frozen=True)
-class BorderConfig:
+class CommandGuardConfig:
     """When the head is held, and when it moves again."""
 
     dead_zone_rad: float = parameter(
@@ -97,13 +97,13 @@ class Command:
     hold: Hold | None
 
 
-class Border:
+class CommandGuard:
     """Every command passes here; one `step` a control period."""
 
     def __init__(
         self,
         limits: JointLimitsConfig,
-        config: BorderConfig,
+        config: CommandGuardConfig,
         period_s: float,
         enabled: bool = True,
     ) -> None:

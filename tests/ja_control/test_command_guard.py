@@ -1,4 +1,4 @@
-"""The border fails closed: nothing unsafe passes, and what is missing holds the head."""
+"""The guard fails closed: nothing unsafe passes, and what is missing holds the head."""
 
 import math
 from dataclasses import replace
@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ja_common.core.health import Level
-from ja_control.core.border import Border, BorderConfig, Cause
+from ja_control.core.command_guard import Cause, CommandGuard, CommandGuardConfig
 from ja_control.core.joint_limits import JointLimitsConfig
 
 PERIOD_S = 0.01
@@ -22,7 +22,7 @@ LIMITS = JointLimitsConfig(
     max_speed_rad_s=2.0,
     max_acceleration_rad_s2=40.0,
 )
-CONFIG = BorderConfig(
+CONFIG = CommandGuardConfig(
     dead_zone_rad=0.005,
     stale_after_s=0.5,
     hold_after_s=0.1,
@@ -34,10 +34,10 @@ CONFIG = BorderConfig(
 
 
 class Rig:
-    """A border, images every third period, and a head that follows its command at once."""
+    """A guard, images every third period, and a head that follows its command at once."""
 
     def __init__(self, posture=(0.0, 0.0), **config):
-        self.border = Border(LIMITS, replace(CONFIG, **config), PERIOD_S)
+        self.guard = CommandGuard(LIMITS, replace(CONFIG, **config), PERIOD_S)
         self.now_s = 100.0
         self.posture = np.array(posture)
         self.images = self.joints = True
@@ -51,13 +51,13 @@ class Rig:
         for _ in range(round(seconds / PERIOD_S)):
             self.now_s += PERIOD_S
             if self.joints:
-                self.border.hear_joints(self.posture, self.now_s, self.joints_age_s)
+                self.guard.hear_joints(self.posture, self.now_s, self.joints_age_s)
             if self.images and self._tick % 3 == 0:
-                self.border.hear_image(self.now_s, self.image_age_s)
-                if aim is not None and self.border.engaged:
-                    self.border.aim(aim)
+                self.guard.hear_image(self.now_s, self.image_age_s)
+                if aim is not None and self.guard.engaged:
+                    self.guard.aim(aim)
             self._tick += 1
-            command = self.border.step(self.now_s)
+            command = self.guard.step(self.now_s)
             if self.follows and command.position is not None:
                 self.posture = command.position
             commands.append(command)
@@ -98,9 +98,9 @@ def test_what_is_not_finite_is_refused_and_changes_nothing(bad):
     rig = Rig()
     rig.run(0.3, aim=(0.2, 0.1))
     with pytest.raises(ValueError, match='target posture must be two finite angles'):
-        rig.border.aim(bad)
+        rig.guard.aim(bad)
     with pytest.raises(ValueError, match='measured posture must be two finite angles'):
-        rig.border.hear_joints(bad, rig.now_s, 0.0)
+        rig.guard.hear_joints(bad, rig.now_s, 0.0)
     assert rig.run(0.05)[-1].position == pytest.approx((0.2, 0.1))
 
 
@@ -155,12 +155,12 @@ def test_joint_states_that_stop_make_the_head_stop():
 def test_after_a_hold_the_command_begins_at_the_measured_posture():
     rig = Rig()
     rig.run(0.5, aim=(0.5, 0.0))
-    rig.border.enable(False)
+    rig.guard.enable(False)
     held = rig.run(0.2)
     assert held[-1].hold.text == 'disabled'
     rig.follows, rig.posture = False, np.array([-0.2, 0.1])  # turned by hand
     assert rig.run(0.2)[-1].position == pytest.approx((0.5, 0.0)), 'no chase of a turned head'
-    rig.border.enable(True)
+    rig.guard.enable(True)
     rig.follows = True
     again = rig.run(0.03)
     assert again[0].position == pytest.approx((-0.2, 0.1))
@@ -169,7 +169,7 @@ def test_after_a_hold_the_command_begins_at_the_measured_posture():
 def test_disabling_brakes_it_does_not_jerk():
     rig = Rig()
     rig.run(0.2, aim=(0.7, 0.0))
-    rig.border.enable(False)
+    rig.guard.enable(False)
     velocities = [c.velocity[0] for c in rig.run(0.1)]
     assert np.diff(velocities).min() >= -40.0 * PERIOD_S - 1e-9
     assert velocities[-1] == 0.0
@@ -228,7 +228,7 @@ def test_latched_fault_waits_for_enable():
     held = rig.run(0.5, aim=(0.5, 0.0))[-1]
     assert held.hold.cause is Cause.SILENT
     assert 'latched until enable is called' in held.hold.text
-    rig.border.enable(True)
+    rig.guard.enable(True)
     assert rig.run(0.5, aim=(0.5, 0.0))[-1].position == pytest.approx((0.5, 0.0))
 
 
@@ -263,7 +263,7 @@ def test_clock_that_runs_back_voids_what_was_heard():
 def test_new_limits_wait_until_the_old_ones_have_stopped_the_head():
     rig = Rig()
     rig.run(0.2, aim=(0.7, 0.0))
-    rig.border.set_limits(replace(LIMITS, max_acceleration_rad_s2=1.0, pan_max_rad=0.1))
+    rig.guard.set_limits(replace(LIMITS, max_acceleration_rad_s2=1.0, pan_max_rad=0.1))
     commands = rig.run(3.0, aim=(0.7, 0.0))
     velocities = [c.velocity[0] for c in commands]
     assert min(np.diff(velocities[:6])) == pytest.approx(-0.4), 'braked by the old limit'
@@ -271,7 +271,7 @@ def test_new_limits_wait_until_the_old_ones_have_stopped_the_head():
     assert commands[-1].position[0] == pytest.approx(0.08)
 
 
-# What may happen to a border, as actions on it and on the world around it.
+# What may happen to a guard, as actions on it and on the world around it.
 anything = st.floats(allow_nan=True, allow_infinity=True)
 angle = st.one_of(st.floats(-2.0, 2.0), anything)
 pair = st.tuples(angle, angle)
@@ -295,7 +295,7 @@ action = st.one_of(
 
 
 class Watch:
-    """Does to a border what a history says, and keeps every command for the judge."""
+    """Does to a guard what a history says, and keeps every command for the judge."""
 
     def __init__(self):
         self.now_s = 0.0
@@ -308,23 +308,23 @@ class Watch:
         getattr(self, f'_{what}')(*arguments)
 
     def _restart(self):
-        self.border = Border(self.limits[-1], replace(CONFIG, stall_after_s=0.06), PERIOD_S)
+        self.guard = CommandGuard(self.limits[-1], replace(CONFIG, stall_after_s=0.06), PERIOD_S)
         self.position = None
 
     def _aim(self, target):
-        self._try(self.border.aim, target)
+        self._try(self.guard.aim, target)
 
     def _joints(self, posture, age_s):
-        if self._try(self.border.hear_joints, posture, self.now_s, age_s):
+        if self._try(self.guard.hear_joints, posture, self.now_s, age_s):
             self.measured = posture
 
     def _image(self, age_s):
-        self.border.hear_image(self.now_s, age_s)
+        self.guard.hear_image(self.now_s, age_s)
 
     def _sound(self, target):
         """A while in which nothing is amiss: the head follows, and images come."""
-        self.border.enable(True)
-        self.border.blocked = ''
+        self.guard.enable(True)
+        self.guard.blocked = ''
         for _ in range(3):
             if self.position is not None:
                 self._joints(tuple(self.position), 0.0)
@@ -333,7 +333,7 @@ class Watch:
             else:
                 self._joints(self.measured, 0.0)
             self._image(0.0)
-            if self.border.engaged:
+            if self.guard.engaged:
                 self._aim(target)
             self._steps(3)
 
@@ -341,13 +341,13 @@ class Watch:
         self.now_s += seconds
 
     def _enable(self, enabled):
-        self.border.enable(enabled)
+        self.guard.enable(enabled)
 
     def _anew(self):
-        self.border.begin_anew()
+        self.guard.begin_anew()
 
     def _block(self, text):
-        self.border.blocked = text
+        self.guard.blocked = text
 
     def _limits(self, speed, acceleration, room):
         changed = replace(
@@ -357,13 +357,13 @@ class Watch:
             pan_min_rad=-room,
             pan_max_rad=room,
         )
-        self.border.set_limits(changed)
+        self.guard.set_limits(changed)
         self.limits.append(changed)
 
     def _steps(self, count):
         for _ in range(count):
             self.now_s += PERIOD_S
-            command = self.border.step(self.now_s)
+            command = self.guard.step(self.now_s)
             self.position = command.position
             self.rows.append((command, self.measured, len(self.limits)))
 

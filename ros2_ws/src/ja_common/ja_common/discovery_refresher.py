@@ -8,7 +8,7 @@ from ja_common.ros_defaults import LEASE_S
 from ja_common.topics import DIAGNOSTICS
 
 
-class Presence:
+class DiscoveryRefresher:
     """Introduces a node anew where DDS would leave its name forgotten.
 
     Participants that have not heard each other for a lease (a process was halted) part, and meet
@@ -41,5 +41,7 @@ class Presence:
 
     def _introduce(self) -> None:
         node = self._node
-        publisher = node.create_publisher(DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.says)
+        publisher = node.create_publisher(
+            DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.publisher_qos
+        )
         node.destroy_publisher(publisher)
