@@ -10,7 +10,9 @@ ROOT = Path(__file__).parent.parent
 
 
 @pytest.mark.parametrize(
-    'tool', [['ruff', 'check', '.', 'ja'], ['mypy']], ids=lambda command: command[0]
+    'tool',
+    [['ruff', 'check', '.', 'ja'], ['ruff', 'format', '--check', '.', 'ja'], ['mypy']],
+    ids=lambda command: ' '.join(command[:2]),
 )
 def test_is_clean(tool):
     result = subprocess.run(
