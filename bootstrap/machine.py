@@ -21,7 +21,7 @@ print(json.dumps([sys.executable, sys.version_info[:2],
 
 
 def clean_environ(environ: Mapping[str, str]) -> dict[str, str]:
-    """The environment without what another virtual environment left in it.
+    """Return the environment without what another virtual environment left in it.
 
     The ROS wheels start Python again with their library folders on LD_LIBRARY_PATH and a mark
     that this was done; inherited, both would make our Python load the other one's libraries.
@@ -40,7 +40,7 @@ def clean_environ(environ: Mapping[str, str]) -> dict[str, str]:
 
 
 def probe_python(command: str, environ: Mapping[str, str]) -> Python | None:
-    """Start an interpreter and ask what it is; None when it cannot be started."""
+    """Start an interpreter and return what it is; None when it cannot be started."""
     try:
         answer = subprocess.run(
             [command, '-c', _PROBE],
@@ -57,7 +57,7 @@ def probe_python(command: str, environ: Mapping[str, str]) -> Python | None:
 
 
 def pythons(environ: Mapping[str, str], existing: str | None = None) -> Iterator[Python]:
-    """Interpreters in the order of preference: the existing environment's, ours, then PATH's."""
+    """Yield interpreters in the order of preference: the existing environment's, ours, PATH's."""
     wanted = environ.get('JA_PYTHON')
     if wanted:
         commands = [wanted]
@@ -72,21 +72,27 @@ def pythons(environ: Mapping[str, str], existing: str | None = None) -> Iterator
             yield python
 
 
-def missing_system_packages(python: Python) -> list[str]:
-    """Debian's names of the system packages without which the set-up or the sim would fail."""
+def missing_system_packages(python: Python, renders: bool = True) -> list[str]:
+    """Return Debian's names of the system packages without which the set-up or the sim would fail.
+
+    `renders`: the sim is installed, which needs a graphics library.
+    """
     missing = []
     if not python.has_ensurepip:
         missing.append('python{}.{}-venv'.format(*python.version))
-    if not (_loads('libEGL.so.1') and _has_gl_driver()) and not _loads('libOSMesa.so.8'):
+    can_render = (_loads('libEGL.so.1') and _has_gl_driver()) or _loads('libOSMesa.so.8')
+    if renders and not can_render:
         missing += ['libegl1', 'libgl1-mesa-dri']
     return missing
 
 
 def is_root() -> bool:
+    """Return whether this process may install system packages."""
     return os.geteuid() == 0
 
 
 def has_apt() -> bool:
+    """Return whether this system installs packages with apt."""
     return shutil.which('apt-get') is not None
 
 

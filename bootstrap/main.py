@@ -15,9 +15,10 @@ from bootstrap.setup_environment import Environment
 def main(root: Path, args: Sequence[str]) -> None:
     """Never returns: the process becomes the command, or ends with a sentence."""
     testing = list(args[:1]) == ['test']
+    documenting = list(args[:1]) == ['docs']
     environment = Environment(root, os.environ)
     try:
-        environment.prepare(dev=testing)
+        environment.prepare(dev=testing, docs=testing or documenting)
     except BootstrapError as error:
         sys.exit(f'ja: {error}')
     except KeyboardInterrupt:
@@ -26,6 +27,9 @@ def main(root: Path, args: Sequence[str]) -> None:
     if testing:
         os.chdir(root)
         command = ['-m', 'pytest', *args[1:]]
+    elif documenting:
+        os.chdir(root)
+        command = ['-m', 'tools.build_docs', *args[1:]]
     else:
         command = ['-m', 'ja_bringup.cli', *args]
     sys.stdout.flush()

@@ -9,6 +9,15 @@ from dataclasses import dataclass
 SUPPORTED = ((3, 10), (3, 13))
 ROS_DISTRO = 'jazzy'
 
+PARTS = {
+    'sim': ('ja_sim',),
+    'dashboard': ('ja_dashboard',),
+    'experiments': ('ja_experiments', 'ja_benchmarks'),
+}
+"""What a rig may leave out by JA_WITHOUT: packages by part; each part has its own lock file."""
+
+_NEEDS = {'experiments': 'sim'}
+
 
 class BootstrapError(Exception):
     """The set-up cannot go on; the message says what to do."""
@@ -16,7 +25,7 @@ class BootstrapError(Exception):
 
 @dataclass(frozen=True)
 class Python:
-    """An interpreter that was really started: a name on PATH alone may be an empty shim."""
+    """An interpreter that was started once: a name on PATH alone may be an empty shim."""
 
     executable: str
     version: tuple[int, int]
@@ -25,11 +34,12 @@ class Python:
 
     @property
     def supported(self) -> bool:
+        """Return whether the system runs on this version."""
         return SUPPORTED[0] <= self.version <= SUPPORTED[1]
 
 
 def ros_is_sourced(environ: Mapping[str, str]) -> bool:
-    """Whether ROS 2 Jazzy is sourced.
+    """Return whether ROS 2 Jazzy is sourced.
 
     Raises BootstrapError when it is another distribution.
     """
@@ -42,10 +52,25 @@ def ros_is_sourced(environ: Mapping[str, str]) -> bool:
     return bool(distro)
 
 
+def parts_left_out(text: str) -> tuple[str, ...]:
+    """Return the parts that JA_WITHOUT leaves out, with those that need one of them, sorted.
+
+    `text`: names of parts, separated by spaces or commas. Raises BootstrapError for another name.
+    """
+    named = set(text.replace(',', ' ').split())
+    unknown = sorted(named - set(PARTS))
+    if unknown:
+        raise BootstrapError(
+            f'JA_WITHOUT={text}: no part is called {", ".join(unknown)}; there are '
+            f'{", ".join(PARTS)}'
+        )
+    return tuple(sorted(named | {part for part, needed in _NEEDS.items() if needed in named}))
+
+
 def choose_python(
     candidates: Iterable[Python], wanted: str | None = None, sourced: bool = False
 ) -> Python:
-    """The interpreter of the environment: the first candidate that can do the job.
+    """Return the interpreter of the environment: the first candidate that can be used.
 
     `wanted` is the user's JA_PYTHON; then the only candidate is that one. With ROS sourced, it
     must be the Python that rclpy was built for. Raises BootstrapError when there is none.
@@ -75,14 +100,14 @@ def choose_python(
 
 @dataclass(frozen=True)
 class Step:
-    """One part of the set-up, done again when its fingerprint is no longer the stamped one."""
+    """One step of the set-up, done again when its fingerprint differs from the stamped one."""
 
     name: str
     fingerprint: str
 
 
 def fingerprint(*parts: str | bytes) -> str:
-    """A short digest of everything that a step depends on."""
+    """Return a short digest of everything that a step depends on."""
     digest = hashlib.sha256()
     for part in parts:
         data = part if isinstance(part, bytes) else part.encode()
@@ -91,7 +116,7 @@ def fingerprint(*parts: str | bytes) -> str:
 
 
 def steps_to_do(steps: Iterable[Step], stamp: Mapping[str, str]) -> list[Step]:
-    """The steps that are missing or outdated. After a new environment, all that follow."""
+    """Return the steps that are missing or outdated; after a new environment, all that follow."""
     todo: list[Step] = []
     for step in steps:
         renewed = bool(todo) and todo[0].name == 'environment'
@@ -101,7 +126,7 @@ def steps_to_do(steps: Iterable[Step], stamp: Mapping[str, str]) -> list[Step]:
 
 
 def apt_advice(packages: Iterable[str], is_root: bool, has_apt: bool) -> str | None:
-    """The sentence for a person who has to install system packages; None when we can."""
+    """Return the sentence for a user who must install system packages; None when we can."""
     names = ' '.join(packages)
     if is_root and has_apt:
         return None

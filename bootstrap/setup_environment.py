@@ -10,18 +10,20 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from bootstrap import machine
 from bootstrap.plan import (
+    PARTS,
     BootstrapError,
     Python,
     Step,
     apt_advice,
     choose_python,
     fingerprint,
+    parts_left_out,
     ros_is_sourced,
     steps_to_do,
 )
@@ -36,39 +38,48 @@ class Environment:
 
     root: Path
     environ: Mapping[str, str]
-    say: Callable[[str], None] = field(default=lambda text: print(f'ja: {text}', file=sys.stderr))
+    report: Callable[[str], None] = field(
+        default=lambda text: print(f'ja: {text}', file=sys.stderr)
+    )
 
     @property
     def folder(self) -> Path:
+        """Return the folder of the virtual environment."""
         return self.root / '.venv'
 
     @property
     def python(self) -> str:
+        """Return the path of the environment's interpreter."""
         return str(self.folder / 'bin' / 'python')
 
     @property
     def log(self) -> Path:
+        """Return the file that holds the output of every command."""
         return self.root / 'runs' / 'setup.log'
 
-    def packages(self) -> list[Path]:
-        return sorted(path.parent for path in self.root.glob('ros2_ws/src/*/setup.py'))
+    def packages(self, without: Iterable[str] = ()) -> list[Path]:
+        """Return the folders of our packages, but those of the parts in `without`."""
+        left_out = {package for part in without for package in PARTS[part]}
+        found = sorted(path.parent for path in self.root.glob('ros2_ws/src/*/setup.py'))
+        return [folder for folder in found if folder.name not in left_out]
 
-    def prepare(self, dev: bool = False) -> None:
+    def prepare(self, dev: bool = False, docs: bool = False) -> None:
         """Make everything ready that is not; raises BootstrapError with one clear sentence.
 
         Safe to interrupt and to run twice at once: a step is stamped when it is done, and one
         process works at a time.
         """
         sourced = ros_is_sourced(self.environ)
-        if self._is_ready(sourced, dev):
+        extra = [lock for lock, wanted in (('dev.lock', dev), ('docs.lock', docs)) if wanted]
+        if self._is_ready(sourced, extra):
             return
         with self._only_one():
             python = self._choose_python(sourced)
             self._install_system_packages(machine.missing_system_packages(python))
-            for step in steps_to_do(self._steps(python.version, sourced, dev), self._stamp()):
+            for step in steps_to_do(self._steps(python.version, sourced, extra), self._stamp()):
                 self._do(step, python)
 
-    def _is_ready(self, sourced: bool, dev: bool) -> bool:
+    def _is_ready(self, sourced: bool, extra: Sequence[str]) -> bool:
         """The quick way, without starting an interpreter."""
         wanted = self.environ.get('JA_PYTHON')
         recorded = self._stamp().get('python', {})
@@ -77,32 +88,28 @@ class Environment:
         if wanted and shutil.which(wanted) != recorded.get('asked'):
             return False
         version = tuple(recorded['version'])
-        return not steps_to_do(self._steps(version, sourced, dev), self._stamp())
+        return not steps_to_do(self._steps(version, sourced, extra), self._stamp())
 
-    def _steps(self, version: tuple[int, int], sourced: bool, dev: bool) -> list[Step]:
+    def _steps(self, version: tuple[int, int], sourced: bool, extra: Sequence[str]) -> list[Step]:
         """In this order: each stands on those before it."""
         locks = self.root / 'requirements'
         base = [] if sourced else ['ros.lock']
         ros = self.environ.get('AMENT_PREFIX_PATH', '') if sourced else 'wheels'
         steps = [
             Step('environment', fingerprint('{}.{}'.format(*version), ros, str(self.root))),
-            *(
-                Step(lock, fingerprint((locks / lock).read_bytes()))
-                for lock in [*base, 'base.lock']
-            ),
+            *(Step(lock, fingerprint((locks / lock).read_bytes())) for lock in wanted),
             Step(
                 'packages',
                 fingerprint(
                     *(
                         (package / name).read_bytes()
-                        for package in self.packages()
-                        for name in ('setup.py', 'setup.cfg')
+                        for package in self.packages(without)
+                        for name in ('setup.py', 'setup.cfg', 'package.xml')
                     )
                 ),
             ),
         ]
-        if dev:
-            steps.append(Step('dev.lock', fingerprint((locks / 'dev.lock').read_bytes())))
+        steps += [Step(lock, fingerprint((locks / lock).read_bytes())) for lock in extra]
         return steps
 
     def _choose_python(self, sourced: bool) -> Python:
@@ -116,15 +123,17 @@ class Environment:
         advice = apt_advice(names, machine.is_root(), machine.has_apt())
         if advice:
             raise BootstrapError(advice)
-        self.say(f'installing system packages: {" ".join(names)}')
+        self.report(f'installing system packages: {" ".join(names)}')
         apt = {**self.environ, 'DEBIAN_FRONTEND': 'noninteractive'}
         self._run(['apt-get', 'update'], apt)
         self._run(['apt-get', 'install', '-y', '--no-install-recommends', *names], apt)
 
-    def _do(self, step: Step, python: Python) -> None:
+    def _do(self, step: Step, python: Python, without: Sequence[str]) -> None:
         began = time.monotonic()
         if step.name == 'environment':
-            self.say('making the virtual environment .venv (Python {}.{})'.format(*python.version))
+            self.report(
+                'making the virtual environment .venv (Python {}.{})'.format(*python.version)
+            )
             self._write_stamp({})
             self._run([python.executable, '-m', 'venv', '--clear', str(self.folder)])
             asked = shutil.which(self.environ.get('JA_PYTHON', '')) or python.executable
@@ -137,7 +146,7 @@ class Environment:
                 },
             )
         elif step.name == 'packages':
-            self.say('installing the packages of ros2_ws')
+            self.report('installing the packages of ros2_ws')
             self._pip(
                 '--no-deps',
                 '--no-build-isolation',
@@ -145,14 +154,14 @@ class Environment:
                 # A plain path entry: quick to import, and followed by mypy and editors.
                 '--config-settings',
                 'editable_mode=compat',
-                *(part for package in self.packages() for part in ('-e', str(package))),
+                *(part for package in self.packages(without) for part in ('-e', str(package))),
             )
         else:
             lock = self.root / 'requirements' / step.name
-            self.say(f'installing requirements/{step.name} (the first time takes minutes)')
+            self.report(f'installing requirements/{step.name} (the first time takes minutes)')
             self._pip('--prefer-binary', '-r', str(lock))
         self._record(step.name, step.fingerprint)
-        self.say(f'  done in {time.monotonic() - began:.0f} s')
+        self.report(f'  done in {time.monotonic() - began:.0f} s')
 
     def _pip(self, *args: str) -> None:
         self._run([self.python, '-m', 'pip', '--disable-pip-version-check', 'install', *args])
@@ -191,7 +200,7 @@ class Environment:
         return f'{" ".join(command[:4])} ... failed: {last} (log: {self.log})'
 
     def _stamp(self) -> dict:
-        """What was done; nothing when the interpreter is gone (its link leads nowhere)."""
+        """Return what was done; {} when the interpreter is gone (its link leads nowhere)."""
         if not os.path.exists(self.python):
             return {}
         try:
@@ -215,6 +224,6 @@ class Environment:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                self.say('another set-up is under way; waiting for it')
+                self.report('another set-up is under way; waiting for it')
                 fcntl.flock(lock, fcntl.LOCK_EX)
             yield

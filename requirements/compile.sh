@@ -14,10 +14,13 @@ cuda=(triton cuda-bindings cuda-pathfinder cuda-toolkit nvidia-cublas nvidia-cud
       nvidia-curand nvidia-cusolver nvidia-cusparse nvidia-cusparselt-cu13 nvidia-nccl-cu13
       nvidia-nvjitlink nvidia-nvshmem-cu13 nvidia-nvtx)
 
-# base first: ros and dev have to agree with what it chose.
+# base first: all the others have to agree with what it chose, and with those before them.
 "${compile[@]}" "${cuda[@]/#/--no-emit-package=}" base.in --output-file base.lock
-"${compile[@]}" ros.in --constraint base.lock --output-file ros.lock
-"${compile[@]}" dev.in --constraint base.lock --constraint ros.lock --output-file dev.lock
+constraints=(--constraint base.lock)
+for part in ros sim dashboard experiments dev docs; do
+    "${compile[@]}" "$part.in" "${constraints[@]}" --output-file "$part.lock"
+    constraints+=(--constraint "$part.lock")
+done
 
 if grep --extended-regexp --line-number 'nvidia|cuda|triton|://' ./*.lock; then
     echo 'compile.sh: the lines above must not be in a lock; add the packages to `cuda`.' >&2

@@ -1,4 +1,4 @@
-"""Recordings made of chosen messages, for tests."""
+"""Recordings of chosen messages, for tests."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,12 +14,12 @@ T0_NS = 1_700_000_000_000_000_000
 
 
 def write_recording(
-    path: Path, said: Iterable[tuple[int, Topic, Any]], limits: Limits | None = None
+    path: Path, messages: Iterable[tuple[int, Topic, Any]], limits: Limits | None = None
 ) -> Path:
-    """A finished recording of (time since the first [ns], topic, message)."""
+    """Write a finished recording of (time since the first [ns], topic, message)."""
     folder = RecordingFolder(path, limits or Limits())
-    for number, (stamp_ns, topic, message) in enumerate(said):
-        folder.write(
+    for number, (stamp_ns, topic, message) in enumerate(messages):
+        folder.write_message(
             channel_of(topic), serialize_message(message), T0_NS + stamp_ns, T0_NS + stamp_ns,
             number,
         )  # fmt: skip
@@ -28,7 +28,7 @@ def write_recording(
 
 
 def channel_of(topic: Topic) -> Channel:
-    """How a recorder would name the topic."""
+    """Return the channel that a recorder would make for the topic."""
     package = topic.type.__module__.split('.')[0]
     name = f'/{topic.name.lstrip("/")}'
     return Channel(

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ja_calibration.core.conductor import Conductor
-from ja_calibration.core.course import Calibration, CourseConfig, course
+from ja_calibration.core.calibration_moves import Calibration, CalibrationConfig, calibration_moves
+from ja_calibration.core.calibration_sequence import CalibrationSequence
 from ja_common.core.geometry import head_rotation
 from ja_common.core.posture import PostureHistory
 from ja_control.core.motion_profile import MotionProfile
@@ -59,7 +59,7 @@ class Wall:
 
 def calibrated(
     spec: HeadSpec,
-    config: CourseConfig,
+    config: CalibrationConfig,
     signs: Sequence[float] = (1.0, 1.0),
     stamps_late_s: float = 0.0,
     picture_of: Callable[[NDArray[np.float64]], NDArray[np.uint8]] | None = None,
@@ -72,33 +72,33 @@ def calibrated(
     head, rng = PanTiltHead(spec), np.random.default_rng(seed)
     picture_of = picture_of or Wall(spec, seed).picture
     turns = np.asarray(signs)
-    conductor = Conductor(course(config, np.zeros(2)))
+    sequence = CalibrationSequence(calibration_moves(config, np.zeros(2)))
     history = PostureHistory()
     film: deque[tuple[int, NDArray[np.float64]]] = deque()
     position, profiles, speed = np.zeros(2), list[MotionProfile](), math.nan
     period = 0
-    while conductor.found is None:
+    while sequence.result is None:
         period += 1
-        if conductor.speed_rad_s != speed:
-            speed = conductor.speed_rad_s
+        if sequence.speed_rad_s != speed:
+            speed = sequence.speed_rad_s
             profiles = [
                 MotionProfile(PERIOD_S, speed, ACCELERATION_RAD_S2, float(p)) for p in position
             ]
-        for profile, aim in zip(profiles, conductor.aim, strict=True):
+        for profile, aim in zip(profiles, sequence.target, strict=True):
             profile.approach(float(aim))
         position = np.array([profile.position for profile in profiles])
         head.command(position * turns)
         head.advance_to(period * PERIOD_S)
         now_ns = round(period * PERIOD_S * 1e9)
         angles = head.read_encoders(now_ns, rng).position * turns
-        history.add(now_ns, angles)
-        conductor.hear_joints(now_ns, angles)
+        history.record_posture(now_ns, angles)
+        sequence.record_joints(now_ns, angles)
         if period % PERIODS_AN_IMAGE == 0:
             film.append((now_ns + round(stamps_late_s * 1e9), head.posture))
         while film and film[0][0] <= now_ns:
             stamp_ns, posture = film.popleft()
             measured = history.at(stamp_ns)
-            if conductor.watches and measured is not None:
-                conductor.see(picture_of(posture), stamp_ns, measured.position)
-        conductor.step(now_ns * 1e-9, position, [profile.velocity for profile in profiles])
-    return conductor.found
+            if sequence.needs_images and measured is not None:
+                sequence.record_image(picture_of(posture), stamp_ns, measured.position)
+        sequence.step(now_ns * 1e-9, position, [profile.velocity for profile in profiles])
+    return sequence.result

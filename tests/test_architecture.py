@@ -4,11 +4,14 @@ Who may import whom is held by `graph/test_rooms.py`.
 """
 
 import ast
+import dataclasses
+import importlib
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from ja_common.core.config import ConfigError
 from ja_common.topics import TOPICS
 
 SOURCES = Path(__file__).parent.parent / 'ros2_ws' / 'src'
@@ -85,6 +88,46 @@ def test_parameters_are_declared_in_one_place():
     assert declaring == {Path('ja_common/ja_common/parameters.py')}
 
 
+def configurations() -> Iterator[tuple[Path, ast.ClassDef]]:
+    """Yield every class that has a field made by `parameter`, with its file."""
+    for path, cls in nodes_of(ast.ClassDef):
+        fields = [field for field in cls.body if isinstance(field, ast.AnnAssign)]
+        if any(called(field.value) in ('parameter', 'interval_parameter') for field in fields):
+            yield path, cls
+
+
+def test_every_configuration_is_a_frozen_dataclass_that_checks_itself():
+    found = list(configurations())
+    assert len(found) > 35
+    wrong = [
+        (path, cls.name)
+        for path, cls in found
+        if [ast.unparse(base) for base in cls.bases] != ['Configuration']
+        or [ast.unparse(line) for line in cls.decorator_list] != ['dataclass(frozen=True)']
+        or any(getattr(method, 'name', '') == '__post_init__' for method in cls.body)
+    ]
+    assert not wrong
+
+
+@pytest.mark.parametrize(
+    ('path', 'name'), [(path, cls.name) for path, cls in configurations()], ids=str
+)
+def test_configuration_refuses_a_value_outside_its_range(path, name):
+    module = importlib.import_module('.'.join(path.with_suffix('').parts[1:]))
+    config_class = getattr(module, name)
+    config_class()
+    for field in dataclasses.fields(config_class):
+        low, high = (field.metadata.get(end) for end in ('low', 'high'))
+        kind = type(field.default)
+        beyond: list = [None]
+        beyond += [] if low is None else [kind(low) - kind(1)]
+        beyond += [] if high is None else [kind(high) + kind(1)]
+        beyond += ['none of these'] if field.metadata.get('choices') else []
+        for value in beyond if 'description' in field.metadata else []:
+            with pytest.raises(ConfigError, match=f'^{field.name} = '):
+                config_class(**{field.name: value})
+
+
 @pytest.mark.parametrize('path', NODES, ids=str)
 def test_node_module_ends_with_its_main(path):
     functions = [node.name for node in TREES[path].body if isinstance(node, ast.FunctionDef)]
@@ -128,8 +171,19 @@ def test_relative_imports_stay_in_their_folder():
     assert not wrong
 
 
+def test_no_two_public_classes_share_a_name():
+    homes: dict[str, list[Path]] = {}
+    for path, tree in TREES.items():
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith('_'):
+                homes.setdefault(node.name, []).append(path)
+    assert len(homes) > 150
+    shared = {name: paths for name, paths in homes.items() if len(paths) > 1}
+    assert not shared
+
+
 def test_topic_names_stand_in_their_table_alone():
-    """Nobody reaches a topic, least of all the truth, by writing its name."""
+    """No node reaches a topic, least of all the truth, by writing its name."""
     names = {topic.name for topic in TOPICS if '/' in topic.name}
     wrong = [
         (path, node.lineno, node.value)

@@ -31,7 +31,7 @@ def picture_of_a_look() -> np.ndarray:
         world.step(0.1)
         seen, joints = world.observe(), world.joint_state()
         posture = Posture(seen.stamp_ns, joints.position, joints.velocity)
-        percept = detector.look(seen.image, seen.stamp_ns, camera, posture)
+        percept = detector.detect(seen.image, seen.stamp_ns, camera, posture)
     world.close()
     picture = annotated(seen.image, percept, camera, WIDTH_SIXTH, latency_s=0.0)
     return cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)

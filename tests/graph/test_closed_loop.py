@@ -33,16 +33,16 @@ def pursue(target, seconds, spec=HEAD_PRESETS['hobby_servo']):
         now_s = tick * CONTROL_S
         head.advance_to(now_s)
         sample = head.read_encoders(round(now_s * 1e9), rng)
-        history.add(sample.stamp_ns, sample.position, sample.velocity)
-        guard.hear_joints(sample.position, now_s, 0.0)
+        history.record_posture(sample.stamp_ns, sample.position, sample.velocity)
+        guard.record_joints(sample.position, now_s, 0.0)
         if tick % CAMERA_TICKS == 0:
             ray = rays_of_directions(head.posture, np.asarray(target(now_s)))
             pictures.append((now_s, sample.stamp_ns, ray))
         while pictures and pictures[0][0] <= now_s - DELAY_S + 1e-9:
             taken_s, stamp_ns, ray = pictures.popleft()
-            guard.hear_image(now_s, now_s - taken_s)
+            guard.record_image(now_s, now_s - taken_s)
             if guard.engaged:
-                guard.aim(history.at(stamp_ns).position + visual_feedback(ray, gain=1.0))
+                guard.set_target(history.at(stamp_ns).position + visual_feedback(ray, gain=1.0))
         command = guard.step(now_s)
         if command.position is not None:
             assert command.hold is None

@@ -9,7 +9,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from ja_common.topics import DIAGNOSTICS
-from ja_runner.graph import NodeSpec
+from ja_runner.node_spec import NodeSpec
 from ros_testing import spin_until
 
 CONTROLLER = NodeSpec('ja_control', 'visual_feedback_controller')
@@ -37,7 +37,7 @@ def test_name_of_a_node_that_was_halted_is_known_again(ros_context, controller):
     executor.add_node(watcher)
 
     def is_known():
-        return CONTROLLER.thing in watcher.get_node_names()
+        return CONTROLLER.executable in watcher.get_node_names()
 
     spin_until(executor, lambda: is_known() and complaints)
     os.kill(controller.pid, signal.SIGSTOP)

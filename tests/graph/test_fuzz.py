@@ -14,9 +14,9 @@ from ja_runner.graph import rig_graph, sim_graph
 from ros_testing import spin_until
 
 THINGS = {
-    spec.thing: spec
+    spec.executable: spec
     for spec in [*sim_graph(), *rig_graph('unused')]
-    if spec.thing not in ('camera', 'sim')
+    if spec.executable not in ('camera', 'sim')
 }
 NUMBERS = (0, 1, -1, 2**31 - 1, -(2**31), float('nan'), float('inf'), 1e30)
 BOUNDS = {

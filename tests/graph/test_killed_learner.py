@@ -15,7 +15,8 @@ from rclpy.node import Node
 
 from ja_common.executor import CachedWaitSetExecutor
 from ja_common.topics import DIAGNOSTICS
-from ja_runner.graph import NodeSpec, sim_graph
+from ja_runner.graph import sim_graph
+from ja_runner.node_spec import NodeSpec
 from ja_runner.supervisor import Supervisor
 
 KILLS = 2
@@ -48,7 +49,7 @@ def graph(folder: Path) -> list[NodeSpec]:
     kept = {'checkpoint_folder': str(folder), 'checkpoint_every_trials': EVERY_TRIALS}
     return [
         replace(node, parameters={**node.parameters, **kept})
-        if node.thing == 'learning_module'
+        if node.executable == 'learning_module'
         else node
         for node in sim_graph(seed=1, sim_parameters=small)
     ]

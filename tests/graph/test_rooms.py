@@ -97,7 +97,7 @@ def test_only_the_scorer_hears_the_truth(ros_context):
     nodes = [
         spec.load()(context=ros_context, cli_args=spec.ros_arguments())
         for spec in [*sim_graph(), *rig_graph(str(Path(__file__).parent))]
-        if spec.thing != 'camera'
+        if spec.executable != 'camera'
     ]
     hearers = {
         node.get_name()

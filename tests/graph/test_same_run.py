@@ -16,7 +16,8 @@ from rclpy.qos import QoSProfile
 from ja_common.executor import CachedWaitSetExecutor
 from ja_common.time_codec import to_ns
 from ja_common.topics import DETECTIONS, IMAGE, JOINT_COMMANDS, LM_DELTA
-from ja_runner.graph import NodeSpec, sim_graph
+from ja_runner.graph import sim_graph
+from ja_runner.node_spec import NodeSpec
 from ja_runner.one_process import run_in_one_process
 from ja_runner.supervisor import Supervisor
 
@@ -65,7 +66,9 @@ def graph(draw_ahead: bool) -> list[NodeSpec]:
         'scene': 'default', 'image_width': 160, 'image_height': 120, 'draw_ahead': draw_ahead,
     }  # fmt: skip
     return [
-        replace(node, parameters={**node.parameters, **gate}) if node.thing == 'gate' else node
+        replace(node, parameters={**node.parameters, **gate})
+        if node.executable == 'gate'
+        else node
         for node in sim_graph(seed=5, sim_parameters=small)
     ]
 

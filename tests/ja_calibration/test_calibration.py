@@ -1,4 +1,4 @@
-"""Calibrations of simulated heads, against what is true of them."""
+"""Calibrations of simulated heads, compared with their true values."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,8 +9,8 @@ import yaml
 from numpy.typing import NDArray
 
 from ja_calibration.calibration_file import as_dict, save
-from ja_calibration.core.course import Calibration, CourseConfig
-from ja_calibration.core.figure import Figure, jackknife
+from ja_calibration.core.calibration_moves import Calibration, CalibrationConfig
+from ja_calibration.core.fitted_value import FittedValue, jackknife
 from ja_calibration.core.lag import Lag
 from ja_calibration.core.optics import fit_gain
 from ja_sim.core.specs import HEAD_PRESETS, HeadSpec
@@ -18,7 +18,7 @@ from simulated_head import calibrated, focal_lengths
 
 IDEAL, HOBBY = HEAD_PRESETS['ideal'], HEAD_PRESETS['hobby_servo']
 WIDE = replace(HOBBY, view_pan_deg=30.0, view_tilt_deg=23.0, backlash_deg=2.0)
-SHORT = CourseConfig(loops=1, slow_rad_s=0.12, slow_swings=4, fast_swings=10)
+SHORT = CalibrationConfig(loops=1, slow_rad_s=0.12, slow_swings=4, fast_swings=10)
 
 
 @pytest.fixture(scope='module')
@@ -29,7 +29,7 @@ def ideal() -> Calibration:
 def assert_near_truth(
     found: Calibration, head: HeadSpec, signs: tuple[float, float], delay_s: float
 ) -> None:
-    """Within what encoders with steps of 0.29 degrees allow in a short course."""
+    """Compare to within what encoders with steps of 0.29 degrees allow in a short run."""
     focal = [found.optics.focal_x.value, found.optics.focal_y.value]
     assert focal == pytest.approx(focal_lengths(head), rel=0.03)
     assert found.optics.signs == signs
@@ -51,7 +51,7 @@ def test_an_ideal_head_is_found_exactly(ideal: Calibration) -> None:
 
 def test_a_hobby_servo_with_a_reversed_joint_and_late_pictures() -> None:
     found = calibrated(HOBBY, SHORT, signs=(-1.0, 1.0), stamps_late_s=0.05)
-    # Its encoders are 10 ms old, and do not know it.
+    # The stamps of its encoders are 10 ms late.
     assert_near_truth(found, HOBBY, (-1.0, 1.0), 0.05 - HOBBY.encoder_delay_s)
 
 
@@ -68,7 +68,7 @@ def test_a_wider_view_a_larger_play_and_the_other_joint_reversed() -> None:
     ],
     ids=['the dark', 'another camera'],
 )
-def test_a_picture_that_allows_none_is_refused(
+def test_images_that_allow_no_calibration_are_refused(
     shown: Callable[[NDArray[np.float64]], NDArray[np.uint8]], complaint: str
 ) -> None:
     with pytest.raises(ValueError, match=complaint):
@@ -87,17 +87,17 @@ def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
 
 
 def test_the_gain_is_how_far_a_joint_goes_for_a_radian() -> None:
-    told = np.linspace(-0.1, 0.1, 9)
-    assert fit_gain(told, 0.9 * told + 0.3).value == pytest.approx(0.9)
+    commanded = np.linspace(-0.1, 0.1, 9)
+    assert fit_gain(commanded, 0.9 * commanded + 0.3).value == pytest.approx(0.9)
 
 
-def test_the_file_says_how_the_rig_counts_and_leaves_a_vague_delay_out(ideal: Calibration) -> None:
+def test_the_file_holds_the_signs_of_the_rig_and_omits_an_uncertain_delay(ideal: Calibration) -> None:
     optics = replace(ideal.optics, signs=(-1.0, 1.0))
     contents = as_dict(replace(ideal, optics=optics), (True, True), (320, 240))
     assert (contents['pan_inverted'], contents['tilt_inverted']) == (False, True)
     assert contents['camera_delay_s']['value'] == pytest.approx(0.0, abs=0.001)
-    vague = replace(ideal, lag=Lag(Figure(0.03, 0.02), ideal.lag.backlash))
-    assert 'camera_delay_s' not in as_dict(vague, (False, False), (320, 240))
+    uncertain = replace(ideal, lag=Lag(FittedValue(0.03, 0.02), ideal.lag.backlash))
+    assert 'camera_delay_s' not in as_dict(uncertain, (False, False), (320, 240))
 
 
 def test_the_file_can_be_read(ideal: Calibration, tmp_path) -> None:
@@ -118,11 +118,11 @@ def test_the_file_can_be_read(ideal: Calibration, tmp_path) -> None:
     ],
     ids=['hobby', 'pan reversed, pictures 50 ms late', 'wide, play 2 deg, tilt reversed'],
 )
-def test_the_whole_course_finds_the_truth(
+def test_the_whole_calibration_finds_the_truth(
     head: HeadSpec, signs: tuple[float, float], late_s: float, seed: int
 ) -> None:
-    """With -s: the lines of the table in docs/deploy.md."""
-    found = calibrated(head, CourseConfig(), signs, late_s, seed=seed)
+    """Print the lines of the table in docs/deploy.md (with -s)."""
+    found = calibrated(head, CalibrationConfig(), signs, late_s, seed=seed)
     optics, lag = found.optics, found.lag
     off = np.array([optics.focal_x.value, optics.focal_y.value]) / focal_lengths(head) - 1
     play = np.degrees([lag.backlash.value, optics.tilt_backlash.value])

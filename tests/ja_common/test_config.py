@@ -3,13 +3,20 @@
 import re
 from dataclasses import dataclass, fields, replace
 
+import numpy as np
 import pytest
 
-from ja_common.core.config import ConfigError, check, checked, parameter
+from ja_common.core.config import (
+    ConfigError,
+    Configuration,
+    checked,
+    interval_parameter,
+    parameter,
+)
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Configuration):
     rate_hz: float = parameter(10.0, 'images a second', low=0.5, high=30.0)
     gain: float = parameter(1.0, 'no upper bound', low=0.0)
     offset: float = parameter(0.0, 'no lower bound', high=1.0)
@@ -40,7 +47,8 @@ def test_good_value_is_accepted_as_the_type_of_the_field(name, value):
     result = checked(FIELD[name], value)
     assert result == value
     assert type(result) is type(FIELD[name].default)
-    check(replace(Config(), **{name: result}))
+    made = getattr(replace(Config(), **{name: value}), name)
+    assert (made, type(made)) == (result, type(result))
 
 
 @pytest.mark.parametrize(
@@ -66,7 +74,7 @@ def test_bad_value_is_refused_in_one_sentence(name, value, message):
     with pytest.raises(ConfigError, match=f'^{re.escape(message)}$'):
         checked(FIELD[name], value)
     with pytest.raises(ConfigError, match=f'^{re.escape(message)}$'):
-        check(replace(Config(), **{name: value}))
+        Config(**{name: value})
 
 
 def test_parameter_without_a_default_is_a_fault_of_the_programmer():
@@ -76,3 +84,46 @@ def test_parameter_without_a_default_is_a_fault_of_the_programmer():
 
     with pytest.raises(TypeError, match='default'):
         checked(fields(Bare)[0], 1.0)
+
+
+def test_number_of_numpy_becomes_a_float():
+    gain = Config(gain=np.float64(2.0)).gain
+    assert type(gain) is float
+    assert gain == 2.0
+
+
+@dataclass(frozen=True)
+class Span(Configuration):
+    low: float = parameter(0.0, 'lower end', low=-1.0, high=1.0)
+    high: float = parameter(0.5, 'upper end', low=-1.0, high=1.0)
+    share: tuple[float, float] = interval_parameter((0.2, 0.4), 'drawn from', 0.0, 1.0)
+    note: str = 'no parameter, and not checked'
+
+    def check_together(self):
+        if self.low >= self.high:
+            raise ConfigError('low must stay below high')
+
+
+def test_fields_are_checked_one_by_one_and_then_together():
+    assert Span(low=-1).low == -1.0
+    assert Span(note=None).note is None
+    with pytest.raises(ConfigError, match=r'^low = -2\.0 is outside the range -1\.0 to 1\.0$'):
+        Span(low=-2, high=-3)
+    with pytest.raises(ConfigError, match='^low must stay below high$'):
+        replace(Span(), low=0.5)
+
+
+@pytest.mark.parametrize(
+    ('share', 'message'),
+    [
+        ([0.2, 0.4], r'share = [0.2, 0.4] is not a pair [low, high] of numbers'),
+        ((0.2,), r'share = (0.2,) is not a pair [low, high] of numbers'),
+        ((0.2, True), r'share = (0.2, True) is not a pair [low, high] of numbers'),
+        ((0.4, 0.2), r'share = [0.4, 0.2] is not a rising pair in [0.0, 1.0]'),
+        ((0.2, 1.2), r'share = [0.2, 1.2] is not a rising pair in [0.0, 1.0]'),
+    ],
+)
+def test_interval_that_does_not_fit_is_refused(share, message):
+    assert Span(share=(0, 1)).share == (0, 1)
+    with pytest.raises(ConfigError, match=f'^{re.escape(message)}$'):
+        Span(share=share)

@@ -9,7 +9,7 @@ import rclpy
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.core.health import Level
 from ja_common.graph_node import GraphNode, spin_node
 from ja_common.topics import DIAGNOSTICS, FIXATION, IMAGE, JOINT_STATES
@@ -141,7 +141,7 @@ def test_sensor_of_any_reliability_is_heard(make_bench):
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Configuration):
     gain: float = parameter(1.0, 'gain', low=0.0)
 
 

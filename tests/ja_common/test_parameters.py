@@ -6,24 +6,24 @@ import pytest
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ja_common.core.config import ConfigError, parameter
+from ja_common.core.config import ConfigError, Configuration, parameter
 from ja_common.parameters import declare_config
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Configuration):
     low: float = parameter(0.0, 'lower end', low=-1.0, high=1.0)
     high: float = parameter(0.5, 'upper end', low=-1.0, high=1.0)
     count: int = parameter(5, 'how many', low=1)
     colour: str = parameter('red', 'which colour', choices=('red', 'green'))
 
-    def __post_init__(self):
+    def check_together(self):
         if self.low >= self.high:
             raise ConfigError('low must stay below high')
 
 
 @dataclass(frozen=True)
-class OtherConfig:
+class OtherConfig(Configuration):
     loud: bool = parameter(False, 'yes or no')
 
 

@@ -13,14 +13,14 @@ def history(*samples, **options):
     """A history of (milliseconds, pan) samples."""
     kept = PostureHistory(**options)
     for ms, pan in samples:
-        kept.add(ms * MS, (pan, 0.0))
+        kept.record_posture(ms * MS, (pan, 0.0))
     return kept
 
 
 def test_posture_is_interpolated_at_the_stamp():
     kept = PostureHistory()
-    kept.add(100 * MS, (0.10, 0.0), (1.0, 0.0))
-    kept.add(120 * MS, (0.14, -0.2), (3.0, -4.0))
+    kept.record_posture(100 * MS, (0.10, 0.0), (1.0, 0.0))
+    kept.record_posture(120 * MS, (0.14, -0.2), (3.0, -4.0))
     at = kept.at(105 * MS)
     assert at.stamp_ns == 105 * MS
     assert at.position == pytest.approx((0.11, -0.05))
@@ -73,9 +73,9 @@ def test_history_forgets_what_is_older_than_its_horizon():
 def test_bad_sample_is_refused_and_nothing_added(position):
     kept = history((100, 0.0))
     with pytest.raises(ValueError, match='two finite numbers'):
-        kept.add(120 * MS, position)
+        kept.record_posture(120 * MS, position)
     with pytest.raises(ValueError, match='joint velocity'):
-        kept.add(120 * MS, (0.0, 0.0), velocity=(np.nan, 0.0))
+        kept.record_posture(120 * MS, (0.0, 0.0), velocity=(np.nan, 0.0))
     assert kept.newest.stamp_ns == 100 * MS
 
 
@@ -86,33 +86,33 @@ def test_still_means_both_joints():
 
 
 def given_now(join):
-    return [(item, None if p is None else p.stamp_ns // MS) for item, p in join.ready()]
+    return [(item, None if p is None else p.stamp_ns // MS) for item, p in join.pop_ready()]
 
 
 def test_image_waits_for_the_joint_states_of_its_time():
     kept = history((100, 0.0))
     join = PostureJoin(kept)
-    join.add(110 * MS, 'a')
-    join.add(130 * MS, 'b')
+    join.queue_item(110 * MS, 'a')
+    join.queue_item(130 * MS, 'b')
     assert given_now(join) == []
-    kept.add(120 * MS, (0.2, 0.0))
+    kept.record_posture(120 * MS, (0.2, 0.0))
     assert given_now(join) == [('a', 110)]
-    kept.add(130 * MS, (0.3, 0.0))
+    kept.record_posture(130 * MS, (0.3, 0.0))
     assert given_now(join) == [('b', 130)]
     assert len(join) == 0
 
 
 def test_image_older_than_the_history_is_given_without_posture():
     join = PostureJoin(history((100, 0.0), (120, 0.1)))
-    join.add(50 * MS, 'old')
-    join.add(110 * MS, 'good')
+    join.queue_item(50 * MS, 'old')
+    join.queue_item(110 * MS, 'good')
     assert given_now(join) == [('old', None), ('good', 110)]
 
 
 def test_waiting_is_bounded():
     join = PostureJoin(PostureHistory(), depth=3)
     for i in range(5):
-        join.add(i * MS, i)
+        join.queue_item(i * MS, i)
     assert given_now(join) == [(0, None), (1, None)]
     assert len(join) == 3
 
@@ -121,19 +121,19 @@ def test_image_from_the_future_does_not_hold_up_the_others():
     """A clock set back leaves an item that waits for a time long gone."""
     kept = history((90_000, 0.0))
     join = PostureJoin(kept)
-    join.add(90 * NS_PER_S + 10 * MS, 'before the jump')
-    kept.add(100 * MS, (0.0, 0.0))
-    kept.add(120 * MS, (0.0, 0.0))
-    join.add(110 * MS, 'after it')
+    join.queue_item(90 * NS_PER_S + 10 * MS, 'before the jump')
+    kept.record_posture(100 * MS, (0.0, 0.0))
+    kept.record_posture(120 * MS, (0.0, 0.0))
+    join.queue_item(110 * MS, 'after it')
     assert given_now(join) == [('after it', 110)]
 
 
 def test_items_behind_one_whose_handling_fails_still_wait():
     kept = history((100, 0.0), (120, 0.1))
     join = PostureJoin(kept)
-    join.add(105 * MS, 'breaks')
-    join.add(110 * MS, 'next')
-    next(iter(join.ready()))  # its handler raised: nobody asks this iterator again
+    join.queue_item(105 * MS, 'breaks')
+    join.queue_item(110 * MS, 'next')
+    next(iter(join.pop_ready()))  # its handler raised: nobody asks this iterator again
     assert given_now(join) == [('next', 110)]
 
 

@@ -12,10 +12,10 @@ class Acted(list):
 
     def __init__(self) -> None:
         super().__init__()
-        self._turns = StampOrderedDispatcher(['a', 'b'])
+        self._dispatcher = StampOrderedDispatcher(['a', 'b'])
 
     def add(self, kind: str, stamp: int) -> None:
-        self._turns.add(kind, stamp, lambda: self.append(f'{kind}{stamp}'))
+        self._dispatcher.queue_action(kind, stamp, lambda: self.append(f'{kind}{stamp}'))
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from ja_common.core.posture import Posture
 from ja_control.core.attention_cycle import (
     AttentionCycle,
     AttentionCycleConfig,
-    Percept,
+    CycleInput,
     Phase,
     Source,
 )
@@ -42,7 +42,7 @@ class AngleWorld:
         still = not self.velocity.any()
         in_view = [o - self.position for o in self.objects if self._sees(o)]
         centred = [d for d in in_view if np.hypot(*d) < D_TH]
-        return Percept(
+        return CycleInput(
             Posture(self.stamp_ns, self.position.copy(), self.velocity.copy()),
             face_delta=self.face - self.position if self._sees(self.face) else None,
             vf_delta=in_view[0] if in_view else None,

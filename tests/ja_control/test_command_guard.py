@@ -51,11 +51,11 @@ class Rig:
         for _ in range(round(seconds / PERIOD_S)):
             self.now_s += PERIOD_S
             if self.joints:
-                self.guard.hear_joints(self.posture, self.now_s, self.joints_age_s)
+                self.guard.record_joints(self.posture, self.now_s, self.joints_age_s)
             if self.images and self._tick % 3 == 0:
-                self.guard.hear_image(self.now_s, self.image_age_s)
+                self.guard.record_image(self.now_s, self.image_age_s)
                 if aim is not None and self.guard.engaged:
-                    self.guard.aim(aim)
+                    self.guard.set_target(aim)
             self._tick += 1
             command = self.guard.step(self.now_s)
             if self.follows and command.position is not None:
@@ -98,9 +98,9 @@ def test_what_is_not_finite_is_refused_and_changes_nothing(bad):
     rig = Rig()
     rig.run(0.3, aim=(0.2, 0.1))
     with pytest.raises(ValueError, match='target posture must be two finite angles'):
-        rig.guard.aim(bad)
+        rig.guard.set_target(bad)
     with pytest.raises(ValueError, match='measured posture must be two finite angles'):
-        rig.guard.hear_joints(bad, rig.now_s, 0.0)
+        rig.guard.record_joints(bad, rig.now_s, 0.0)
     assert rig.run(0.05)[-1].position == pytest.approx((0.2, 0.1))
 
 
@@ -312,14 +312,14 @@ class Watch:
         self.position = None
 
     def _aim(self, target):
-        self._try(self.guard.aim, target)
+        self._try(self.guard.set_target, target)
 
     def _joints(self, posture, age_s):
-        if self._try(self.guard.hear_joints, posture, self.now_s, age_s):
+        if self._try(self.guard.record_joints, posture, self.now_s, age_s):
             self.measured = posture
 
     def _image(self, age_s):
-        self.guard.hear_image(self.now_s, age_s)
+        self.guard.record_image(self.now_s, age_s)
 
     def _sound(self, target):
         """A while in which nothing is amiss: the head follows, and images come."""
@@ -344,7 +344,7 @@ class Watch:
         self.guard.enable(enabled)
 
     def _anew(self):
-        self.guard.begin_anew()
+        self.guard.restart()
 
     def _block(self, text):
         self.guard.blocked = text

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ja_control.core.joint_limits import JointLimitsConfig
-from ja_control.core.urdf_limits import narrowed, read_joint
+from ja_control.core.urdf_limits import narrow_limits, read_joint
 
 PLAIN = (np.ones(2), np.zeros(2))
 
@@ -19,7 +19,7 @@ def urdf(pan='0 0 1', tilt='0 1 0', limits='lower="-0.5" upper="0.9" velocity="1
 
 def limits_of(text, signs=PLAIN[0], offsets=PLAIN[1]):
     joints = [read_joint(text, name) for name in ('pan', 'tilt')]
-    return narrowed(JointLimitsConfig(), *joints, signs, offsets)
+    return narrow_limits(JointLimitsConfig(), *joints, signs, offsets)
 
 
 def test_the_narrower_of_urdf_and_parameters_holds():
@@ -51,7 +51,7 @@ def test_axis_is_that_in_the_frame_of_the_root():
         (urdf(limits='lower="1" upper="-1" velocity="1"'), 'cannot move'),
         (urdf(limits='lower="2" upper="3" velocity="1"'), 'limits of the URDF and'),
         (urdf().replace('"pan" type="revolute"', '"pan" type="fixed"'), 'fixed, not revolute'),
-        (urdf().replace('parent link="base"', 'parent link="eye"'), 'run in a circle'),
+        (urdf().replace('parent link="base"', 'parent link="eye"'), 'form a loop'),
     ],
 )
 def test_what_cannot_be_used_is_refused_in_one_sentence(text, complaint):

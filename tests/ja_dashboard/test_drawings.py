@@ -7,7 +7,7 @@ import pytest
 
 from ja_common.core.detection import Detection, Kind
 from ja_dashboard.core.drawings import from_above, postures
-from ja_dashboard.core.view_model import Glance, Truth
+from ja_dashboard.core.view_model import Glance, TruthView
 
 LEFT_DOWN = (0.5, 0.2)  # pan to the left, tilt downward
 
@@ -73,7 +73,7 @@ def test_the_belief_is_a_cloud_whose_heaviest_point_is_opaque():
 
 def test_the_truth_marks_the_object_that_she_means():
     places = np.array([[0.8, 0.3, 0.0], [0.7, -0.2, 0.1]])
-    truth = Truth(places, np.array([[0.36, 0.0], [-0.28, -0.14]]), attended=1)
+    truth = TruthView(places, np.array([[0.36, 0.0], [-0.28, -0.14]]), attended=1)
     for draw in (from_above, postures):
         assert len(drawn(draw(glance(truth=truth)), 'truth')) == 2
         [meant] = drawn(draw(glance(truth=truth)), 'meant')

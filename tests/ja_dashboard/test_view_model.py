@@ -3,7 +3,7 @@
 import pytest
 
 from ja_common.core.health import Level
-from ja_dashboard.core.view_model import CurvePoints, Light, Run, ViewModel
+from ja_dashboard.core.view_model import CurvePoints, Light, RunState, ViewModel
 
 
 def gate(phase, source='none', **more):
@@ -20,16 +20,18 @@ def model():
 
 
 def test_a_graph_that_stands_still_is_stopped_and_says_for_how_long(model):
-    assert model.state(1.0).run is Run.WAITING
-    assert model.state(60.0).run is Run.STOPPED
+    assert model.state(1.0).run is RunState.WAITING
+    assert model.state(60.0).run is RunState.STOPPED
     model.hear_image(1, now_s=60.0)
     model.hear_gate(gate('shift', 'LM'))
     state = model.state(61.0)
-    assert (state.run, state.is_live) == (Run.RUNNING, True)
+    assert (state.run, state.is_live) == (RunState.RUNNING, True)
     assert 'learning module' in state.text
     model.hear_image(1, now_s=69.0)
     state = model.state(70.0)
-    assert (state.run, state.is_live) == (Run.STOPPED, False), 'the same image again is no news'
+    assert (state.run, state.is_live) == (RunState.STOPPED, False), (
+        'the same image again is no news'
+    )
     assert state.text == 'no new image for 10 s'
 
 
@@ -37,22 +39,22 @@ def test_a_pause_is_told_from_a_stop(model):
     model.hear_health(light(paused='True'))
     model.hear_image(1, now_s=0.0)
     model.hear_image(1, now_s=9.0)
-    assert model.state(10.0).run is Run.PAUSED
+    assert model.state(10.0).run is RunState.PAUSED
     assert model.switches()['sim/pause'] is True
-    assert model.state(20.0).run is Run.STOPPED, 'a simulation that says nothing is no pause'
+    assert model.state(20.0).run is RunState.STOPPED, 'a simulation that says nothing is no pause'
 
 
 def test_a_head_that_is_held_says_why(model):
     model.hear_image(1, now_s=0.0)
     model.hear_gate(gate('look', reason='disabled'))
     state = model.state(0.1)
-    assert (state.run, state.text) == (Run.HELD, 'the gate holds the head: disabled')
+    assert (state.run, state.text) == (RunState.HELD, 'the gate holds the head: disabled')
 
 
 def test_somebody_who_begins_to_look_does_not_see_a_stop(model):
     model.hear_image(1, now_s=0.0)
     model.watch(now_s=100.0)
-    assert model.state(100.5).run is Run.RUNNING
+    assert model.state(100.5).run is RunState.RUNNING
 
 
 def trial(model, *shifts, fixated):

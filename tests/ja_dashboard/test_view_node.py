@@ -9,7 +9,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_srvs.srv import SetBool, Trigger
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.core.detection import Detection, Kind
 from ja_common.core.health import Level
 from ja_common.detection_codec import encode_detections
@@ -30,7 +30,7 @@ from ja_common.topics import (
     SCORE,
     SIM_TRUTH,
 )
-from ja_dashboard.core.view_model import Run
+from ja_dashboard.core.view_model import RunState
 from ja_dashboard.view_node import ViewNode
 from node_bench import header
 
@@ -102,7 +102,7 @@ def test_an_image_is_shown_with_what_was_found_in_it(bench):
     # A ray to the right of the axis is a direction of less pan.
     assert frame.glance.directions[0, 0] == pytest.approx(0.2 - math.atan(0.1), abs=0.01)
     assert frame.glance.half_view[0] == pytest.approx(math.radians(18))
-    assert frame.state.run is Run.RUNNING
+    assert frame.state.run is RunState.RUNNING
     assert 0 <= frame.latencies_ms[DETECTIONS.name] < 10_000
 
 
@@ -110,7 +110,7 @@ def test_a_picture_without_its_detections_waits_for_them(bench):
     watch(bench)
     head = header(7_000_000_000)
     bench.publish(IMAGE, encode_image(np.zeros((48, 64, 3), np.uint8), head.stamp, 'eye'))
-    bench.wait(lambda: bench.node.frame.state.run is Run.RUNNING)
+    bench.wait(lambda: bench.node.frame.state.run is RunState.RUNNING)
     assert bench.node.frame.picture is None
     bench.publish(DETECTIONS, encode_detections(head, []))
     bench.wait(lambda: bench.node.frame.picture)
@@ -183,7 +183,7 @@ def test_buttons_call_services_and_log_the_answer(bench):
 
 
 @dataclass(frozen=True)
-class LiveConfig:
+class LiveConfig(Configuration):
     objects: int = parameter(3, 'how many', low=0, high=10)
     real_time_factor: float = parameter(0.0, 'how fast', low=0.0, high=100.0)
 

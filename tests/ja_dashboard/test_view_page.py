@@ -13,7 +13,7 @@ from nicegui.testing import User, user_simulation
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.detection import Detection, Kind
 from ja_common.core.health import Level
-from ja_dashboard.core.view_model import CurvePoints, Light, Run, State
+from ja_dashboard.core.view_model import CurvePoints, Light, RunState, State
 from ja_dashboard.image_feed import Picture
 from ja_dashboard.page import PICTURE_URL, Page, facts_html, nodes_html
 from ja_dashboard.server import picture_app
@@ -29,7 +29,7 @@ class Robot:
         self.orders = []
         self.frame = Frame(
             **{
-                'state': State(Run.RUNNING, 'looking at the caregiver'),
+                'state': State(RunState.RUNNING, 'looking at the caregiver'),
                 'facts': {'p(LM)': '0.31'},
                 'lights': [Light('/gate', Level.WARN, 'no <image>', 0.0, {})],
                 'latencies_ms': {'detections': 4.2},
@@ -83,7 +83,7 @@ def test_a_stopped_graph_is_shown_as_stopped_and_its_picture_as_old():
         [picture] = user.find(ui.interactive_image).elements
         assert 'ja-old' in picture.classes
 
-    browse(Robot(state=State(Run.STOPPED, 'no new image for 9 s')), steps)
+    browse(Robot(state=State(RunState.STOPPED, 'no new image for 9 s')), steps)
 
 
 def test_buttons_give_orders_and_a_reset_asks_first():

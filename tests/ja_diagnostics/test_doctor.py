@@ -1,4 +1,4 @@
-"""The doctor finds what is wrong, and says how to mend it."""
+"""The doctor finds what is wrong, and how to fix it."""
 
 import os
 import socket
@@ -21,19 +21,19 @@ def test_every_check_has_the_name_of_its_finding(domain):
     for name, check in quick.items():
         finding = check()
         assert finding.name == name
-        assert finding.well or finding.mend
+        assert finding.ok or finding.fix
 
 
-@pytest.mark.parametrize(('version', 'well'), [((3, 9), False), ((3, 10), True), ((3, 14), False)])
-def test_the_version_of_python(version, well, monkeypatch):
+@pytest.mark.parametrize(('version', 'ok'), [((3, 9), False), ((3, 10), True), ((3, 14), False)])
+def test_the_version_of_python(version, ok, monkeypatch):
     monkeypatch.setattr(sys, 'version_info', (*version, 0))
     finding = check_python()
-    assert finding.well is well
-    assert ('JA_PYTHON' in finding.mend) is not well
+    assert finding.ok is ok
+    assert ('JA_PYTHON' in finding.fix) is not ok
 
 
 def test_shared_memory_that_is_not_there(tmp_path):
-    assert not check_shared_memory(tmp_path / 'none').well
+    assert not check_shared_memory(tmp_path / 'none').ok
     assert check_shared_memory(tmp_path).name == 'shared memory'
 
 
@@ -50,13 +50,13 @@ def test_the_ports_of_the_domain(domain, monkeypatch):
         other.bind(('127.0.0.1', 7400 + 250 * domain + 10))
         assert 'another ROS 2 graph' in check_ports().text
     monkeypatch.setitem(os.environ, 'ROS_DOMAIN_ID', '150')
-    assert not check_ports().well
+    assert not check_ports().ok
 
 
 @pytest.mark.usefixtures('domain')
-def test_a_graphics_driver_that_fails_is_told(monkeypatch):
+def test_a_graphics_driver_that_fails_is_reported(monkeypatch):
     monkeypatch.setattr(doctor, '_RENDER', 'raise OSError("no libEGL")')
     finding = doctor.check_graphics()
-    assert not finding.well
+    assert not finding.ok
     assert 'no libEGL' in finding.text
-    assert 'libegl1' in finding.mend
+    assert 'libegl1' in finding.fix

@@ -1,4 +1,4 @@
-"""What disturbs the head's messages does just that; what is not well is called so."""
+"""Disturbances change the messages as they should, and a bad outcome is not ok."""
 
 import dataclasses
 from pathlib import Path
@@ -6,19 +6,19 @@ from pathlib import Path
 import pytest
 
 from ja_diagnostics.faults.disturbance import Disturbance
-from ja_diagnostics.faults.run import COLUMNS, FaultRun, Outcome
+from ja_diagnostics.faults.run import COLUMNS, FaultOutcome, FaultRun
 
 
 def through(disturbance, messages, times_s, until_s=10.0):
-    """What goes out at which time [s], looked at every 10 ms."""
-    said = []
+    """Return what goes out at which time [s], polled every 10 ms."""
+    out = []
     for tick in range(round(until_s / 0.01)):
         now_s = tick * 0.01
         for message, put_s in zip(messages, times_s, strict=True):
             if put_s == pytest.approx(now_s):
-                disturbance.put(message, now_s)
-        said += [(message, now_s) for message in disturbance.due(now_s)]
-    return said
+                disturbance.queue_message(message, now_s)
+        out += [(message, now_s) for message in disturbance.pop_due(now_s)]
+    return out
 
 
 def test_undisturbed_messages_go_out_as_they_come():
@@ -30,21 +30,21 @@ def test_silence():
 
 
 def test_delay_keeps_the_order():
-    said = through(Disturbance(delay_s=0.5), 'abc', [0.1, 0.2, 0.2])
-    assert [message for message, _ in said] == ['a', 'b', 'c']
-    assert [now_s for _, now_s in said] == pytest.approx([0.6, 0.7, 0.7], abs=0.011)
+    out = through(Disturbance(delay_s=0.5), 'abc', [0.1, 0.2, 0.2])
+    assert [message for message, _ in out] == ['a', 'b', 'c']
+    assert [now_s for _, now_s in out] == pytest.approx([0.6, 0.7, 0.7], abs=0.011)
 
 
 def test_disorder_loses_nothing_but_one_under_way():
-    said = through(Disturbance(swapped=True), 'abcde', [0.1, 0.2, 0.3, 0.4, 0.5])
-    assert [message for message, _ in said] == ['b', 'a', 'd', 'c']
+    out = through(Disturbance(swapped=True), 'abcde', [0.1, 0.2, 0.3, 0.4, 0.5])
+    assert [message for message, _ in out] == ['b', 'a', 'd', 'c']
 
 
-GOOD = Outcome('camera stopped', True, 0.15, 0.3, (0, 0))
+GOOD = FaultOutcome('camera stopped', True, 0.15, 0.3, (0, 0))
 
 
-def test_outcome_that_is_well():
-    assert GOOD.well
+def test_outcome_that_is_ok():
+    assert GOOD.ok
     assert GOOD.row() == ('camera stopped', '0.15', '-', '0.3', '0', '0', 'ok')
     assert len(GOOD.row()) == len(COLUMNS)
 
@@ -59,15 +59,15 @@ def test_outcome_that_is_well():
         {'lost': (0, 2)},
     ],
 )
-def test_outcome_that_is_not_well(change):
-    assert not dataclasses.replace(GOOD, **change).well
+def test_outcome_that_is_not_ok(change):
+    assert not dataclasses.replace(GOOD, **change).ok
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures('domain')
 def test_head_stops_and_goes_on_through_every_fault(tmp_path: Path):
-    said: list[str] = []
-    run = FaultRun(tmp_path, said.append)
+    out: list[str] = []
+    run = FaultRun(tmp_path, out.append)
     assert run.run(run.faults()) == 0
     assert len(run.outcomes) == len(run.faults())
-    assert [outcome for outcome in run.outcomes if not outcome.well] == []
+    assert [outcome for outcome in run.outcomes if not outcome.ok] == []

@@ -1,4 +1,4 @@
-"""What `./ja topics` says of a graph."""
+"""What `./ja topics` shows of a graph."""
 
 import threading
 
@@ -6,7 +6,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from ja_common.topics import DETECTIONS, FIXATION, SUCCESS_RATE
-from ja_diagnostics.topics_table import look_at_topics, table_of_topics
+from ja_diagnostics.topics_table import measure_topics, table_of_topics
 
 
 def test_a_graph_is_listed_with_rates_and_purposes(ros_context):
@@ -29,7 +29,7 @@ def test_a_graph_is_listed_with_rates_and_purposes(ros_context):
     thread = threading.Thread(target=spin, daemon=True)
     thread.start()
     try:
-        rows = {row.name: row for row in look_at_topics(1.0)}
+        rows = {row.name: row for row in measure_topics(1.0)}
     finally:
         ended.set()
         thread.join()
@@ -43,5 +43,5 @@ def test_a_graph_is_listed_with_rates_and_purposes(ros_context):
     success = rows['/robot/sim/success_rate']
     assert (success.quality, success.rate_hz) == ('reliable, latched', 0.0)
     assert success.subscribers == []
-    assert '/robot/fixation' not in rows, 'nobody says it'
+    assert '/robot/fixation' not in rows, 'no node publishes it'
     assert table_of_topics(list(rows.values())).row_count == len(rows)

@@ -17,12 +17,12 @@ from ja_experiments.paper.report import write_report
 from ja_experiments.paper.study import StudyConfig, run_study
 from ja_experiments.progress import Progress
 from ja_learning.core.trial import Trial
-from ja_recording.core.dataset import COLUMNS, TABLE, Sample, read_dataset, write_dataset
+from ja_recording.core.dataset import COLUMNS, TABLE, TrialSample, read_dataset, write_dataset
 from ja_sim.core.specs import ObjectsSpec
 
 
 @pytest.fixture
-def samples(looks: Looks) -> list[Sample]:
+def samples(looks: Looks) -> list[TrialSample]:
     """Trials of two shifts; what is fixated is not what she meant, by a tenth of a radian."""
     rng = np.random.default_rng(0)
     found = []
@@ -37,16 +37,16 @@ def samples(looks: Looks) -> list[Sample]:
             seen,
             number % 3,
         )
-        found.append(Sample(trial, 'a', 10 * number, 10 * number + 5, 'VF', meant, False))
+        found.append(TrialSample(trial, 'a', 10 * number, 10 * number + 5, 'VF', meant, False))
     return found
 
 
 @pytest.fixture
-def folder(tmp_path: Path, samples: list[Sample]) -> Path:
+def folder(tmp_path: Path, samples: list[TrialSample]) -> Path:
     return write_dataset(tmp_path / 'data', samples, (), 'CC0').parent
 
 
-def same(a: Sample, b: Sample) -> bool:
+def same(a: TrialSample, b: TrialSample) -> bool:
     arrays = ('face', 'face_at', 'postures', 'fixation', 'candidates', 'seen_before_shift')
     lessons = all(np.array_equal(getattr(a.lesson, n), getattr(b.lesson, n)) for n in arrays)
     nothing = {'lesson': a.lesson, 'meant': None, 'label': None}
@@ -55,7 +55,7 @@ def same(a: Sample, b: Sample) -> bool:
     return lessons and others and all(targets)
 
 
-def test_what_is_written_is_read(samples: list[Sample], folder: Path) -> None:
+def test_what_is_written_is_read(samples: list[TrialSample], folder: Path) -> None:
     read = read_dataset(folder)
     assert len(read) == len(samples)
     assert all(same(a, b) for a, b in zip(samples, read, strict=True))
@@ -67,7 +67,7 @@ def test_the_card_names_every_column(folder: Path) -> None:
     assert 'Licence: CC0.' in card
 
 
-def test_nothing_is_written_over(samples: list[Sample], folder: Path) -> None:
+def test_nothing_is_written_over(samples: list[TrialSample], folder: Path) -> None:
     with pytest.raises(ConfigError, match='name another folder'):
         write_dataset(folder, samples, (), '')
 
@@ -107,7 +107,7 @@ def test_looks_are_learned_from_in_their_order(folder: Path, looks: Looks) -> No
 
 
 def test_without_truth_what_was_fixated_is_taken_for_what_she_meant(
-    tmp_path: Path, samples: list[Sample], looks: Looks
+    tmp_path: Path, samples: list[TrialSample], looks: Looks
 ) -> None:
     real = [replace(sample, meant=None, joint_attention=None) for sample in samples]
     materials = recorded_materials(
@@ -127,7 +127,9 @@ def test_objects_are_placed_around_where_she_was_looked_at(places: ObjectsSpec) 
     assert found.tilt_deg == pytest.approx((-25, 30))
 
 
-def test_the_experiment_learns_from_recorded_looks(tmp_path: Path, samples: list[Sample]) -> None:
+def test_the_experiment_learns_from_recorded_looks(
+    tmp_path: Path, samples: list[TrialSample]
+) -> None:
     """Of somebody who never meant anything out of view."""
     seen = [s for s in samples if (np.abs(s.meant - s.lesson.postures[0]) < (0.28, 0.2)).all()]
     folder = write_dataset(tmp_path / 'data', seen, (), '').parent

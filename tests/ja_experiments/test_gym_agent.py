@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from ja_experiments.agents.gym_agent import GymAgent
-from ja_learning.core.gaze_line import GazeLineConfig
-from ja_learning.core.learner import LearnerChoice, make_learner
-from ja_learning.core.network import NetworkConfig
+from ja_learning.core.gaze_line_config import GazeLineConfig
+from ja_learning.core.learner_registry import LearnerChoice, make_learner
+from ja_learning.core.network_config import NetworkConfig
 
 
 @pytest.mark.parametrize('kind', ['paper', 'gaze_line'])

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from ja_learning.core.background_learner import BackgroundLearner
-from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
+from ja_learning.core.gaze_line import GazeLineLearner
+from ja_learning.core.gaze_line_config import GazeLineConfig
 from made_up_trials import trial
 
 PATIENCE_S = 10.0

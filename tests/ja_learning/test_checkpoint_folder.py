@@ -10,9 +10,11 @@ import pytest
 from ja_common.core.config import ConfigError
 from ja_learning.core.checkpoint import load_checkpoint, save_checkpoint
 from ja_learning.core.checkpoint_folder import LAST, CheckpointConfig, CheckpointFolder, Resumed
-from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
-from ja_learning.core.learner import LearnerChoice, make_learner
-from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
+from ja_learning.core.gaze_line import GazeLineLearner
+from ja_learning.core.gaze_line_config import GazeLineConfig
+from ja_learning.core.learner_registry import LearnerChoice, make_learner
+from ja_learning.core.network import ThreeLayerNetwork
+from ja_learning.core.network_config import NetworkConfig
 from made_up_trials import trial
 
 KINDS = (ThreeLayerNetwork.kind, GazeLineLearner.kind)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from ja_learning.core.checkpoint_folder import CheckpointConfig, CheckpointFolder
-from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
+from ja_learning.core.gaze_line import GazeLineLearner
+from ja_learning.core.gaze_line_config import GazeLineConfig
 from made_up_trials import trial
 
 KILLS = 50

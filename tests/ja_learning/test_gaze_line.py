@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
+from ja_learning.core.gaze_line import GazeLineLearner
+from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_learning.core.gaze_line_belief import GazeLineBelief
 from ja_learning.core.gaze_line_network import (
     ANGLE_SCALE_RAD,
@@ -15,8 +16,8 @@ from ja_learning.core.gaze_line_network import (
     standardised,
 )
 from ja_learning.core.gaze_line_pass import GazeLinePass
-from ja_learning.core.learner import LearnerChoice, make_learner
-from ja_learning.core.network import NetworkConfig
+from ja_learning.core.learner_registry import LearnerChoice, make_learner
+from ja_learning.core.network_config import NetworkConfig
 from ja_learning.core.trial import Trial
 
 LOOK = np.array([0.1, -0.05])

@@ -24,7 +24,8 @@ from ja_common.topics import (
     LM_DELTA,
 )
 from ja_learning.core.learning_module import BELIEF_SAMPLES
-from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
+from ja_learning.core.network import ThreeLayerNetwork
+from ja_learning.core.network_config import NetworkConfig
 from ja_learning.core.trial import Trial
 from ja_learning.learning_module_node import LearningModuleNode
 from node_bench import header, joint_state

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork, face_inputs
+from ja_learning.core.network import ThreeLayerNetwork, face_inputs
+from ja_learning.core.network_config import NetworkConfig
 from ja_learning.core.trial import FACE_SHAPE, Trial
 
 RNG = np.random.default_rng(5)

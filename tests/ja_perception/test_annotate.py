@@ -19,7 +19,7 @@ def test_draws_on_a_copy_what_was_found(size):
     draw_ball(picture, 0.85 * width, 0.2 * height, 0.05 * width)
     camera = CameraModel.from_field_of_view(width, height, np.radians(36))
     posture = Posture(1, np.zeros(2), np.zeros(2))
-    percept = SalientFeatureDetector(BlazeFace()).look(picture, 1, camera, posture)
+    percept = SalientFeatureDetector(BlazeFace()).detect(picture, 1, camera, posture)
     before = picture.copy()
     drawn = annotated(
         picture, percept.detections, percept.face_image, camera, d_th_rad=0.1, latency_s=0.0123

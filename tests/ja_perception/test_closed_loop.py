@@ -30,8 +30,8 @@ def test_face_then_most_salient_object(wide):
     offsets = {'face': [], 'object': []}
     for number in range(60):
         what = 'face' if number < 30 else 'object'
-        view, posture = head.look(wide, number * FRAME_NS)
-        percept = detector.look(view, posture.stamp_ns, camera, posture)
+        view, posture = head.render_view(wide, number * FRAME_NS)
+        percept = detector.detect(view, posture.stamp_ns, camera, posture)
         seen = caregiver_face(percept.detections) if what == 'face' else percept.target
         assert seen is not None
         offsets[what].append(np.hypot(*seen.ray))

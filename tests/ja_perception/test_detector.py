@@ -44,7 +44,7 @@ def caregiver_and_ball():
 def test_face_first_then_objects_by_saliency(finder):
     picture = caregiver_and_ball()
     draw_ball(picture, 40, 200, 20, GREEN)
-    percept = SalientFeatureDetector(finder).look(picture, STEP_NS, CAMERA, at())
+    percept = SalientFeatureDetector(finder).detect(picture, STEP_NS, CAMERA, at())
     face, larger, smaller = percept.detections
     assert face.kind is Kind.FACE
     assert (larger.u, larger.v) == pytest.approx((40, 200), abs=1)
@@ -54,7 +54,7 @@ def test_face_first_then_objects_by_saliency(finder):
 
 
 def test_size_of_colour_follows_its_formula(finder):
-    percept = SalientFeatureDetector(finder).look(caregiver_and_ball(), STEP_NS, CAMERA, at())
+    percept = SalientFeatureDetector(finder).detect(caregiver_and_ball(), STEP_NS, CAMERA, at())
     gazing_px = np.pi * (CAMERA.width / 6) ** 2  # d_th of the paper: a sixth of the width
     area = np.pi * 14**2
     assert percept.target.f_col == pytest.approx(area / (area + gazing_px), rel=0.1)
@@ -65,7 +65,7 @@ def test_skin_and_clothes_of_a_face_are_no_object(finder):
     picture = room()
     draw_face(picture, 160, 110, 80)
     picture[150:160, 130:190] = RED  # lipstick, or a scarf
-    percept = SalientFeatureDetector(finder).look(picture, STEP_NS, CAMERA, at())
+    percept = SalientFeatureDetector(finder).detect(picture, STEP_NS, CAMERA, at())
     assert [d.kind for d in percept.detections] == [Kind.FACE]
 
 
@@ -75,7 +75,7 @@ def test_skin_and_clothes_of_a_face_are_no_object(finder):
 def test_attended_when_in_the_centre_and_still(finder, u, velocity, attended):
     picture = room()
     draw_face(picture, u, 110, 80)
-    percept = SalientFeatureDetector(finder).look(
+    percept = SalientFeatureDetector(finder).detect(
         picture, STEP_NS, CAMERA, at(velocity=(velocity, 0.0))
     )
     assert percept.detections[0].attended is attended
@@ -84,10 +84,10 @@ def test_attended_when_in_the_centre_and_still(finder, u, velocity, attended):
 
 def test_without_a_posture_nothing_is_attended_and_memory_starts_anew(finder):
     detector = SalientFeatureDetector(finder)
-    first = detector.look(caregiver_and_ball(), STEP_NS, CAMERA, None)
+    first = detector.detect(caregiver_and_ball(), STEP_NS, CAMERA, None)
     assert first.face_image is None
     assert not first.detections[0].attended
-    later = detector.look(caregiver_and_ball(), 2 * STEP_NS, CAMERA, at((0.7, 0.1)))
+    later = detector.detect(caregiver_and_ball(), 2 * STEP_NS, CAMERA, at((0.7, 0.1)))
     assert later.detections[0].attended
 
 
@@ -97,7 +97,7 @@ def test_face_image_shows_the_look(finder):
     def crop(look, u):
         picture = room()
         draw_face(picture, u, 112, 80, look)
-        percept = SalientFeatureDetector(finder).look(picture, STEP_NS, CAMERA, at())
+        percept = SalientFeatureDetector(finder).detect(picture, STEP_NS, CAMERA, at())
         return percept.face_image.astype(float)
 
     ahead, elsewhere, left, right = crop(0, 160), crop(0, 168.5), crop(1, 160), crop(-1, 160)
@@ -113,13 +113,13 @@ def test_a_panned_scene_does_not_move_but_a_mover_does(finder):
     wall = np.random.default_rng(2).integers(90, 160, (60, 80), np.uint8)
     wall = np.kron(wall, np.ones((8, 8), np.uint8))
     head.command((0.12, 0.0))
-    head.look(np.zeros((480, 640, 3), np.uint8), 0)
+    head.render_view(np.zeros((480, 640, 3), np.uint8), 0)
     for k in range(1, 11):
         wide = np.dstack([wall] * 3)
         draw_ball(wide, 240 + 14 * k, 240, 16, (255, 255, 255))
         head.command((0.15 - 0.03 * k, 0.0))
-        view, posture = head.look(wide, k * STEP_NS)
-        percept = detector.look(view, k * STEP_NS, CAMERA, posture)
+        view, posture = head.render_view(wide, k * STEP_NS)
+        percept = detector.detect(view, k * STEP_NS, CAMERA, posture)
         assert percept.motion_judged is (k > 2)
         if k > 2:
             ball = (240 + 14 * k - 319.5, 0.5) / np.array(320 / np.tan(np.radians(30)))
@@ -131,10 +131,10 @@ def test_a_panned_scene_does_not_move_but_a_mover_does(finder):
 def test_motion_is_not_judged_while_the_head_is_fast(finder):
     detector = SalientFeatureDetector(finder, interest(0, 0, 1))
     for k in (1, 2, 3):
-        percept = detector.look(room(), k * STEP_NS, CAMERA, at())
+        percept = detector.detect(room(), k * STEP_NS, CAMERA, at())
     assert percept.motion_judged
     picture = caregiver_and_ball()
-    percept = detector.look(picture, 4 * STEP_NS, CAMERA, at(velocity=(3.0, 0)))
+    percept = detector.detect(picture, 4 * STEP_NS, CAMERA, at(velocity=(3.0, 0)))
     assert not percept.motion_judged
     assert percept.target is None
 
@@ -145,7 +145,7 @@ def test_sizes_from_tiny_to_large_report_original_pixels(finder, size):
     picture = room(width, height)
     draw_ball(picture, 0.7 * width, 0.4 * height, 0.05 * width)
     camera = CameraModel.from_field_of_view(width, height, FIELD_OF_VIEW)
-    percept = SalientFeatureDetector(finder).look(picture, STEP_NS, camera, at())
+    percept = SalientFeatureDetector(finder).detect(picture, STEP_NS, camera, at())
     assert percept.target.u == pytest.approx(0.7 * width, abs=max(1, 0.005 * width))
     assert percept.target.v == pytest.approx(0.4 * height, abs=max(1, 0.005 * width))
 
@@ -157,7 +157,7 @@ def test_same_images_same_percepts(finder):
         for k in range(6):
             picture = caregiver_and_ball()
             draw_ball(picture, 60 + 5 * k, 180, 12, GREEN)
-            looks.append(detector.look(picture, (k + 1) * STEP_NS, CAMERA, at()).detections)
+            looks.append(detector.detect(picture, (k + 1) * STEP_NS, CAMERA, at()).detections)
         return looks
 
     assert run() == run()
@@ -165,9 +165,9 @@ def test_same_images_same_percepts(finder):
 
 def test_size_of_the_image_may_change_in_between(finder):
     detector = SalientFeatureDetector(finder, interest(1, 1, 1))
-    detector.look(caregiver_and_ball(), STEP_NS, CAMERA, at())
+    detector.detect(caregiver_and_ball(), STEP_NS, CAMERA, at())
     small = np.ascontiguousarray(caregiver_and_ball()[::2, ::2])
-    percept = detector.look(small, 2 * STEP_NS, CAMERA.resized(160, 120), at())
+    percept = detector.detect(small, 2 * STEP_NS, CAMERA.resized(160, 120), at())
     assert percept.detections[0].attended
     assert all(d.f_mot == 0 for d in percept.detections)
 
@@ -180,7 +180,7 @@ def test_alpha_decides_what_is_extracted(finder):
     by_texture = SalientFeatureDetector(finder, interest(0, 1, 0))
     by_both = SalientFeatureDetector(finder, interest(1, 1, 0))
     counts = [
-        len(d.look(picture, STEP_NS, CAMERA, at()).detections)
+        len(d.detect(picture, STEP_NS, CAMERA, at()).detections)
         for d in (by_colour, by_texture, by_both)
     ]
     assert counts == [1, 1, 2]

@@ -46,10 +46,10 @@ def test_clock_set_back_starts_new_numbers(tracker):
 
 
 def test_target_is_held_between_equals_but_yields_to_the_clearly_better(tracker):
-    assert tracker.held([0, 1], [0.50, 0.49], 0) == [0.50, 0.49]
-    held = tracker.held([0, 1], [0.49, 0.52], SECOND)
+    assert tracker.apply_hysteresis([0, 1], [0.50, 0.49], 0) == [0.50, 0.49]
+    held = tracker.apply_hysteresis([0, 1], [0.49, 0.52], SECOND)
     assert held[0] > held[1]
-    held = tracker.held([0, 1], [0.49, 0.60], SECOND)
+    held = tracker.apply_hysteresis([0, 1], [0.49, 0.60], SECOND)
     assert held[1] > held[0]
-    held = tracker.held([0, 1], [0.52, 0.50], SECOND)
+    held = tracker.apply_hysteresis([0, 1], [0.52, 0.50], SECOND)
     assert held[1] > held[0]

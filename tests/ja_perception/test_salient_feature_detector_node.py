@@ -174,7 +174,7 @@ def test_image_waits_for_the_posture_at_its_own_stamp(rig):
     rig.image(PERIOD_NS, room())
     rig.answer()
     rig.image(2 * PERIOD_NS, room())
-    rig.wait(lambda: 'heard the image' if rig.detector._images._waiting else None)
+    rig.wait(lambda: rig.detector._synchroniser.waits_for_posture or None)
     assert len(rig.all_of(DETECTIONS)) == 1
     rig.joints(2 * PERIOD_NS)
     assert to_ns(rig.answer(2).header.stamp) == 2 * PERIOD_NS

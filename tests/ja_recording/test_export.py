@@ -1,4 +1,4 @@
-"""From a recording to a data set: what a stranger reads there is what the learner was taught."""
+"""From a recording to a data set: it holds what the learner learned from."""
 
 import numpy as np
 import pytest
@@ -8,15 +8,16 @@ from ja_bringup.cli import app
 from ja_common.core.config import ConfigError
 from ja_learning.core.checkpoint import load_checkpoint
 from ja_learning.core.checkpoint_folder import LAST
-from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
-from ja_recording.core.dataset import Sample, read_dataset
+from ja_learning.core.network import ThreeLayerNetwork
+from ja_learning.core.network_config import NetworkConfig
+from ja_recording.core.dataset import TrialSample, read_dataset
 from ja_recording.learner_score import score_learner
 from recorded_days import LOOK, TRIALS, day, recorded, said_in
 from recordings import write_recording
 
 
-def exported(tmp_path, *paths) -> list[Sample]:
-    """What is read after `./ja export`."""
+def exported(tmp_path, *paths) -> list[TrialSample]:
+    """Return the data set that `./ja export` writes."""
     command = ['export', *map(str, paths), '--to', str(tmp_path / 'data')]
     done = CliRunner().invoke(app, command, obj=[], catch_exceptions=False)
     assert done.exit_code == 0, done.output
@@ -27,13 +28,13 @@ def test_the_data_set_holds_what_was_seen_and_done(tmp_path):
     recorded(tmp_path / 'monday')
     samples = exported(tmp_path, tmp_path / 'monday')
     assert len(samples) == TRIALS
-    for sample, (face, meant, other) in zip(samples, day(), strict=True):
-        np.testing.assert_array_equal(sample.lesson.face, face)
-        np.testing.assert_array_equal(sample.lesson.postures, [LOOK])
+    for sample, (face, attended, other) in zip(samples, day(), strict=True):
+        np.testing.assert_array_equal(sample.trial.face, face)
+        np.testing.assert_array_equal(sample.trial.postures, [LOOK])
         # Detections travel as float32.
-        np.testing.assert_allclose(sample.lesson.candidates, [meant, other], atol=1e-6)
-        np.testing.assert_array_equal(sample.lesson.fixation, meant)
-        np.testing.assert_allclose(sample.meant, meant, atol=1e-6)
+        np.testing.assert_allclose(sample.trial.candidates, [attended, other], atol=1e-6)
+        np.testing.assert_array_equal(sample.trial.fixation, attended)
+        np.testing.assert_allclose(sample.attended_direction, attended, atol=1e-6)
         assert sample.joint_attention
         assert sample.recording == 'monday'
         assert sample.fixation_ns - sample.look_ns == 100_000_000
@@ -41,12 +42,12 @@ def test_the_data_set_holds_what_was_seen_and_done(tmp_path):
 
 def test_a_learner_of_the_data_set_becomes_the_learner_of_the_recording(tmp_path):
     recording = recorded(tmp_path / 'monday')
-    arguments = ['-p', f'checkpoint_folder:={tmp_path / "life"}', '-p', 'seed:=3']
+    arguments = ['-p', f'checkpoint_folder:={tmp_path / "trained"}', '-p', 'seed:=3']
     score_learner(recording, arguments)
-    weights, _ = load_checkpoint(tmp_path / 'life' / LAST)
+    weights, _ = load_checkpoint(tmp_path / 'trained' / LAST)
     network = ThreeLayerNetwork(NetworkConfig(), 3)
     for sample in exported(tmp_path, tmp_path / 'monday'):
-        network.learn(sample.lesson)
+        network.learn(sample.trial)
     for name, array in network.state().items():
         np.testing.assert_array_equal(weights[name], array, err_msg=name)
 

@@ -1,4 +1,4 @@
-"""The graph is recorded, and the recording becomes a graph again."""
+"""A graph is recorded, and the recording is played back as a graph."""
 
 import re
 import signal
@@ -28,15 +28,15 @@ from ja_recording.player_node import PlayerNode
 from ja_recording.recorder_node import RecorderNode
 from recordings import T0_NS, write_recording
 
-ALWAYS_SPEAK = '^/(rosout|parameter_events|diagnostics)$'
+ALWAYS_PUBLISHED = '^/(rosout|parameter_events|diagnostics)$'
 
 
 def test_every_topic_is_recorded_but_those_left_out(make_bench, tmp_path):
     bench = make_bench(RecorderNode, folder=str(tmp_path / 'r'), exclude='image_annotated|target')
     topics = (SUCCESS_RATE, IMAGE, IMAGE_ANNOTATED, TARGET)
     publishers = {t: bench.peer.create_publisher(t.type, t.name, t.publisher_qos) for t in topics}
-    heard = (publishers[SUCCESS_RATE], publishers[IMAGE])
-    bench.wait(lambda: all(p.get_subscription_count() for p in heard))
+    recorded = (publishers[SUCCESS_RATE], publishers[IMAGE])
+    bench.wait(lambda: all(p.get_subscription_count() for p in recorded))
     for topic, publisher in publishers.items():
         publisher.publish(topic.type())
     publishers[SUCCESS_RATE].publish(Float32(data=0.75))
@@ -50,9 +50,9 @@ def test_every_topic_is_recorded_but_those_left_out(make_bench, tmp_path):
 
 
 def test_another_library_decodes_every_type_of_the_graph(make_bench, tmp_path):
-    """By the schemas in the file alone: ours on one side, rosbags on the other."""
-    bench = make_bench(RecorderNode, folder=str(tmp_path / 'r'), exclude=ALWAYS_SPEAK)
-    topics = [topic for topic in TOPICS if not re.match(ALWAYS_SPEAK, topic.name)]
+    """The schemas in the file suffice: this project writes, rosbags reads."""
+    bench = make_bench(RecorderNode, folder=str(tmp_path / 'r'), exclude=ALWAYS_PUBLISHED)
+    topics = [topic for topic in TOPICS if not re.match(ALWAYS_PUBLISHED, topic.name)]
     publishers = {t: bench.peer.create_publisher(t.type, t.name, t.publisher_qos) for t in topics}
     bench.wait(lambda: all(p.get_subscription_count() for p in publishers.values()))
     for topic, publisher in publishers.items():
@@ -84,7 +84,7 @@ def test_it_survives_kill_9_up_to_the_last_second(make_bench, tmp_path):
         bench.wait(lambda: publisher.get_subscription_count() == 2)
         for value in range(50):
             publisher.publish(Float32(data=float(value)))
-        # Flushed twice a second: what was said a second ago is there.
+        # Flushed twice a second: a message that was published a second ago is there.
         bench.wait(lambda: len(rates_in(folder)) == 50)
     finally:
         process.send_signal(signal.SIGKILL)
@@ -106,7 +106,7 @@ def rates(count: int, every_ns: int):
     return [(i * every_ns, SUCCESS_RATE, Float32(data=float(i))) for i in range(count)]
 
 
-def test_a_recording_is_said_again_with_its_time(make_bench, tmp_path):
+def test_a_recording_is_published_again_with_its_time(make_bench, tmp_path):
     path = write_recording(tmp_path / 'r', rates(5, 10**8))
     bench = make_bench(
         PlayerNode,
@@ -123,17 +123,17 @@ def test_a_recording_is_said_again_with_its_time(make_bench, tmp_path):
     assert clock[-1] <= T0_NS + 10**9
 
 
-def test_the_recorded_clock_wins(make_bench, tmp_path):
-    said = [*rates(2, 10**7), (2 * 10**7, CLOCK, Clock(clock=to_time(77)))]
-    path = write_recording(tmp_path / 'r', said)
+def test_the_recorded_clock_is_played(make_bench, tmp_path):
+    messages = [*rates(2, 10**7), (2 * 10**7, CLOCK, Clock(clock=to_time(77)))]
+    path = write_recording(tmp_path / 'r', messages)
     bench = make_bench(PlayerNode, subscribes=[CLOCK], recording=str(path), start_after_s=0.2)
     bench.wait(lambda: bench.node.done and bench.messages(CLOCK))
     assert [to_ns(message.clock) for message in bench.messages(CLOCK)] == [77]
 
 
 def test_topics_are_left_out(make_bench, tmp_path):
-    said = [*rates(2, 10), (5, TARGET, TARGET.type())]
-    path = write_recording(tmp_path / 'r', said)
+    messages = [*rates(2, 10), (5, TARGET, TARGET.type())]
+    path = write_recording(tmp_path / 'r', messages)
     bench = make_bench(
         PlayerNode, subscribes=[TARGET], recording=str(path), without='sim/success_rate',
         start_after_s=0.2,

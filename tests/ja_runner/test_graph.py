@@ -9,7 +9,8 @@ from rclpy.node import Node
 
 from ja_common.core.config import ConfigError
 from ja_common.ros_arguments import split_ros_arguments
-from ja_runner.graph import CONFIG, NodeSpec, preset, rig_graph, sim_graph, swapped, with_arguments
+from ja_runner.graph import CONFIG, preset, replace_nodes, rig_graph, sim_graph, with_arguments
+from ja_runner.node_spec import NodeSpec
 
 
 def test_names_follow_from_the_thing():
@@ -73,7 +74,7 @@ def test_every_node_of_a_graph_is_there(graph):
 
 @pytest.mark.parametrize(('ahead', 'glance_images'), [(False, 1), (True, 2)])
 def test_a_fixation_is_longer_than_a_glance_of_the_fast_learner(ahead, glance_images):
-    graph = {n.thing: n.parameters for n in sim_graph(sim_parameters={'draw_ahead': ahead})}
+    graph = {n.executable: n.parameters for n in sim_graph(sim_parameters={'draw_ahead': ahead})}
     image_s = 1 / graph['sim']['camera_rate_hz']
     hold_s = graph['internal_evaluator']['hold_s']
     # From the first image at rest to the last one of a glance, and to the next after that.
@@ -82,15 +83,15 @@ def test_a_fixation_is_longer_than_a_glance_of_the_fast_learner(ahead, glance_im
 
 
 def test_only_the_sim_graph_has_a_truth_to_score():
-    assert {'sim', 'scorer'} <= {spec.thing for spec in GRAPHS['sim']}
+    assert {'sim', 'scorer'} <= {spec.executable for spec in GRAPHS['sim']}
     for name in ('rig', 'bare rig'):
-        assert not {'sim', 'scorer'} & {spec.thing for spec in GRAPHS[name]}
-    assert 'camera' not in {spec.thing for spec in GRAPHS['bare rig']}
+        assert not {'sim', 'scorer'} & {spec.executable for spec in GRAPHS[name]}
+    assert 'camera' not in {spec.executable for spec in GRAPHS['bare rig']}
 
 
 @pytest.mark.parametrize('path', sorted(CONFIG.glob('*.yaml')), ids=lambda path: path.name)
 def test_every_configured_parameter_exists_in_the_node_it_is_for(path, ros_context):
-    graph = {spec.thing: spec for graph in GRAPHS.values() for spec in graph}
+    graph = {spec.executable: spec for graph in GRAPHS.values() for spec in graph}
     sections = yaml.safe_load(path.read_text())
     for section, content in sections.items():
         thing = section.rsplit('/', 1)[-1]
@@ -106,7 +107,7 @@ def test_every_configured_parameter_exists_in_the_node_it_is_for(path, ros_conte
 @pytest.mark.parametrize('name', ['rig_ros2_control', 'rig_topics'])
 def test_configurations_of_rigs_fit_the_gate(name, ros_context):
     """A name or value that the gate does not know would be an error here, not on the rig."""
-    [gate] = [spec for spec in rig_graph() if spec.thing == 'gate']
+    [gate] = [spec for spec in rig_graph() if spec.executable == 'gate']
     parameters = {**gate.parameters, **preset(CONFIG / f'{name}.yaml', 'gate')}
     spec = NodeSpec('ja_control', 'gate', parameters)
     node = spec.load()(context=ros_context, cli_args=spec.ros_arguments())
@@ -116,17 +117,17 @@ def test_configurations_of_rigs_fit_the_gate(name, ros_context):
 
 
 def test_on_a_rig_learner_and_gate_keep_what_they_know_side_by_side():
-    kept = {spec.thing: spec.parameters for spec in GRAPHS['bare rig']}
+    kept = {spec.executable: spec.parameters for spec in GRAPHS['bare rig']}
     checkpoints = Path(kept['learning_module']['checkpoint_folder'])
     assert Path(kept['gate']['trials_file']).parent == checkpoints.parent
 
 
 def test_a_node_of_another_package_takes_the_place_and_the_parameters():
     ours = sim_graph(seed=3)
-    theirs = swapped(ours, ['gate=ja_sim/scorer'])
+    theirs = replace_nodes(ours, ['gate=ja_sim/scorer'])
     changed = [(a, b) for a, b in zip(ours, theirs, strict=True) if a != b]
     [(gate, other)] = changed
-    assert (other.package, other.thing) == ('ja_sim', 'scorer')
+    assert (other.package, other.executable) == ('ja_sim', 'scorer')
     assert other.parameters == gate.parameters
 
 
@@ -142,4 +143,4 @@ def test_a_node_of_another_package_takes_the_place_and_the_parameters():
 )
 def test_a_swap_that_cannot_be_is_refused_with_the_reason(swap, why):
     with pytest.raises(ConfigError, match=why):
-        swapped(sim_graph(), [swap])
+        replace_nodes(sim_graph(), [swap])

@@ -8,7 +8,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from ja_runner.graph import NodeSpec
+from ja_runner.node_spec import NodeSpec
 from ja_runner.one_process import run_in_one_process
 
 pytestmark = pytest.mark.usefixtures('domain')

@@ -45,9 +45,9 @@ def test_without_a_terminal_a_plain_line_is_printed(make_bench):
     node = make_bench(ProgressNode).node
     text = io.StringIO()
     with Display('title', Console(file=text)) as display:
-        display.show(node)
-        display.show(node)
-        display.say('[ERROR] [gate]: [not markup]')
+        display.update(node)
+        display.update(node)
+        display.print_line('[ERROR] [gate]: [not markup]')
     first, second = text.getvalue().splitlines()
     assert first.startswith('trials: 0')
     assert second == '[ERROR] [gate]: [not markup]'
@@ -57,6 +57,6 @@ def test_on_a_terminal_a_table_lives(make_bench):
     node = make_bench(ProgressNode).node
     text = io.StringIO()
     with Display('the title', Console(file=text, force_terminal=True, width=90)) as display:
-        display.show(node)
+        display.update(node)
     assert 'the title' in text.getvalue()
     assert 'waiting for the first image' in text.getvalue()

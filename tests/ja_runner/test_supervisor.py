@@ -13,7 +13,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from ja_runner.graph import NodeSpec
+from ja_runner.node_spec import NodeSpec
 from ja_runner.supervisor import Supervisor
 
 pytestmark = pytest.mark.usefixtures('domain')
@@ -146,7 +146,7 @@ def test_a_bad_parameter_gives_one_sentence(tmp_path):
 SUPERVISING = """
 import sys, time
 from pathlib import Path
-from ja_runner.graph import NodeSpec
+from ja_runner.node_spec import NodeSpec
 from ja_runner.supervisor import Supervisor
 graph = [NodeSpec('dummy_nodes', 'talker'), NodeSpec('dummy_nodes', 'stubborn')]
 supervisor = Supervisor(graph, Path(sys.argv[1]), report=lambda _: None, patience_s=0.3)

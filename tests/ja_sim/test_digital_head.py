@@ -25,8 +25,8 @@ def centroid(picture):
 
 def settled(head, posture, wide):
     head.command(posture)
-    head.look(wide, SECOND)
-    return head.look(wide, 3 * SECOND)
+    head.render_view(wide, SECOND)
+    return head.render_view(wide, 3 * SECOND)
 
 
 @pytest.mark.parametrize('posture', [(0, 0), (0.2, 0), (-0.3, 0.1), (0.25, -0.2)])
@@ -53,12 +53,12 @@ def test_wide_picture_of_many_pixels_is_shrunk_without_shift():
 def test_servo_cruises_at_its_speed_and_comes_to_rest():
     head = DigitalHead(DigitalHeadConfig(speed_rad_s=1.0, time_constant_s=0.05))
     wide = np.zeros((480, 640), np.uint8)
-    head.look(wide, 0)
+    head.render_view(wide, 0)
     head.command((0.4, 0.0))
-    _, moving = head.look(wide, SECOND // 10)
+    _, moving = head.render_view(wide, SECOND // 10)
     assert moving.position == pytest.approx((0.1, 0.0))
     assert moving.velocity == pytest.approx((1.0, 0.0))
-    _, resting = head.look(wide, 2 * SECOND)
+    _, resting = head.render_view(wide, 2 * SECOND)
     assert resting.position == pytest.approx((0.4, 0.0), abs=1e-6)
     assert abs(resting.velocity).max() < 1e-6
 
@@ -68,10 +68,10 @@ def test_motion_does_not_depend_on_the_rate_of_images():
     positions = []
     for images in (1, 7):
         head = DigitalHead(DigitalHeadConfig(speed_rad_s=2.0, time_constant_s=0.1))
-        head.look(wide, 0)
+        head.render_view(wide, 0)
         head.command((0.45, -0.1))
         for k in range(1, images + 1):
-            _, posture = head.look(wide, k * SECOND // (4 * images))
+            _, posture = head.render_view(wide, k * SECOND // (4 * images))
         positions.append(posture.position)
     assert positions[0] == pytest.approx(positions[1], abs=1e-9)
 

@@ -3,7 +3,6 @@
 They are not part of this project: pip and apt bring them into a cache, where they stay.
 """
 
-import os
 import shutil
 import subprocess
 import sys
@@ -15,6 +14,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from ja_common.core.cache import cache_folder
 
 # Where each package keeps its pictures.
 _WHEELS = {
@@ -60,8 +61,7 @@ def package_folder(requirement: str) -> Path:
 
 
 def _cache() -> Path:
-    base = Path(os.environ.get('XDG_CACHE_HOME', Path.home() / '.cache'))
-    folder = base / 'joint_attention'
+    folder = cache_folder()
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 

@@ -17,7 +17,7 @@ from ja_bringup.examples import show_examples
 from ja_common.core.config import ConfigError
 from ja_common.ros_arguments import split_ros_arguments
 from ja_common.ros_defaults import apply_ros_defaults
-from ja_runner.graph import RECORDER, rig_graph, sim_graph, swapped, with_arguments
+from ja_runner.graph import RECORDER, replace_nodes, rig_graph, sim_graph, with_arguments
 
 app = typer.Typer(
     help='A camera head that learns joint attention, on ROS 2. ROS arguments go behind '
@@ -111,7 +111,7 @@ def demo(
 
     scene = scene or SCENE[learner.value]
     sim = {'scene': scene, 'draw_ahead': draw_ahead}
-    graph = swapped(sim_graph(seed, sim, learner.value), swap or ())
+    graph = replace_nodes(sim_graph(seed, sim, learner.value), swap or ())
     stages = standard_course(trials or PRACTICE_TRIALS[learner.value], time_s, exam_trials)
     graph = with_arguments([*[RECORDER] * record, *graph], context.obj or [])
     sys.exit(run_demo(graph, stages, one_process, on_death.value, context.obj or [], view, resume))
@@ -139,7 +139,9 @@ def rig(
 
     arguments = context.obj or []
     code, _ = run_graph(
-        with_arguments([*[RECORDER] * record, *swapped(rig_graph(source), swap or ())], arguments),
+        with_arguments(
+            [*[RECORDER] * record, *replace_nodes(rig_graph(source), swap or ())], arguments
+        ),
         new_run_folder('rig'),
         'Joint attention, on real pictures',
         lambda node: 0.0 < time_s < node.elapsed_s,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ja_bringup.course import Course, Stage
-from ja_runner.graph import NodeSpec
+from ja_runner.node_spec import NodeSpec
 from ja_runner.progress import WINDOW_TRIALS, ProgressNode
 from ja_runner.run import check_memory, new_run_folder, run_graph
 from ja_runner.supervisor import OnDeath

@@ -64,8 +64,8 @@ EXAMPLES: dict[str, dict[str, str]] = {
         './ja calibrate --ros-args -p use_sim_time:=true': 'of a simulated head',
     },
     'doctor': {
-        './ja doctor': 'what is wrong, and how to mend it',
-        "./ja doctor --json | jq '.[] | select(.well | not)'": 'only what is wrong',
+        './ja doctor': 'what is wrong, and how to fix it',
+        "./ja doctor --json | jq '.[] | select(.ok | not)'": 'only what is wrong',
     },
     'topics': {
         './ja topics': 'of the graph in this ROS_DOMAIN_ID',

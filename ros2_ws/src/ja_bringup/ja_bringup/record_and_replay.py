@@ -10,7 +10,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ja_common.ros_arguments import check_ros_arguments
 from ja_recording.core.reader import Recording, warn_of_unfinished
-from ja_runner.graph import NodeSpec
+from ja_runner.node_spec import NodeSpec
 from ja_runner.one_process import run_in_one_process
 
 

@@ -13,7 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from ja_common.ros_arguments import check_ros_arguments
-from ja_recording.core.dataset import Sample, write_dataset
+from ja_recording.core.dataset import TrialSample, write_dataset
 from ja_recording.core.reader import Recording, warn_of_unfinished
 from ja_recording.learner_score import score_learner, success_rate, write_csv
 from ja_recording.trials import RecordedTrial, recorded_trials
@@ -53,7 +53,7 @@ def export(paths: Sequence[Path], folder: Path, licence: str, arguments: Sequenc
     check_ros_arguments(arguments)
     recordings = {path: Recording(path) for path in paths}
 
-    def samples() -> Iterator[Sample]:
+    def samples() -> Iterator[TrialSample]:
         for path, recording in recordings.items():
             warn_of_unfinished(recording)
             with _bar(recording, path.name) as advance:
@@ -65,9 +65,9 @@ def export(paths: Sequence[Path], folder: Path, licence: str, arguments: Sequenc
     return 0
 
 
-def sample_of(trial: RecordedTrial, recording: str) -> Sample:
+def sample_of(trial: RecordedTrial, recording: str) -> TrialSample:
     """A recorded trial as a row of a data set."""
-    return Sample(
+    return TrialSample(
         trial.lesson,
         recording,
         trial.look_ns,

@@ -23,9 +23,10 @@ from ja_bringup.sros_policy import policy_xml
 from ja_common.graph_node import GraphNode
 from ja_common.parameters import UNBOUNDED
 from ja_common.qos_text import offered_text
+from ja_common.rclpy_private import parameter_names
 from ja_common.topics import CLOCK, TOPICS
 from ja_recording.recording_folder import Channel, Limits, RecordingFolder
-from ja_runner.graph import NodeSpec
+from ja_runner.node_spec import NodeSpec
 
 NODES = (
     NodeSpec('ja_perception', 'camera'),
@@ -100,7 +101,7 @@ def every_node(
         try:
             for spec in specs:
                 make = spec.load()
-                own = overrides.get(spec.thing, [])
+                own = overrides.get(spec.executable, [])
                 nodes.append(make(context=context, parameter_overrides=own, cli_args=cli_args))
             yield nodes
         finally:
@@ -114,7 +115,7 @@ def _stand_ins(folder: Path) -> dict[str, list[Parameter]]:
     cv2.imwrite(str(folder / 'grey.png'), np.full((48, 64, 3), 128, np.uint8))
     recording = RecordingFolder(folder / 'played', Limits())
     clock = Channel(CLOCK.name, 'rosgraph_msgs/msg/Clock', offered_text([CLOCK.publisher_qos]))
-    recording.write(clock, serialize_message(Clock()), 0, 0, 0)
+    recording.write_message(clock, serialize_message(Clock()), 0, 0, 0)
     recording.close()
     return {
         'camera': [Parameter('source', value=str(folder))],
@@ -153,7 +154,7 @@ def parameters_page(nodes: list[GraphNode]) -> str:
     for node in nodes:
         head = f'\n## {node.get_name()}\n\n| parameter | default | range | what it is |\n'
         rows = []
-        for name in sorted(node._parameters):
+        for name in parameter_names(node):
             if name.startswith(_NOT_OURS) or name.startswith('qos_overrides'):
                 continue
             descriptor = node.describe_parameter(name)

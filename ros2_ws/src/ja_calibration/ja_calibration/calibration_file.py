@@ -1,22 +1,25 @@
-"""What was found, as a table for people and as a YAML file."""
+"""The result of a calibration as a YAML file."""
 
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from ja_calibration.core.course import Calibration
-from ja_calibration.core.figure import Figure
+from ja_calibration.core.calibration_moves import Calibration
+from ja_calibration.core.fitted_value import FittedValue
 
-SUREST_DELAY_ERROR_S = 0.005
-"""A delay with a larger standard error is not written: it would be off by 10 ms now and then."""
+LARGEST_DELAY_ERROR_S = 0.005
+"""A delay with a larger standard error is not written: it could be off by 10 ms."""
 
 
 def as_dict(
-    found: Calibration, inverted: tuple[bool, bool], image_size: tuple[int, int]
+    result: Calibration, inverted: tuple[bool, bool], image_size: tuple[int, int]
 ) -> dict[str, Any]:
-    """The file's contents; `inverted` is what `pan_inverted`, `tilt_inverted` were meanwhile."""
-    optics, lag = found.optics, found.lag
+    """Return the contents of the file.
+
+    `inverted`: the values of `pan_inverted` and `tilt_inverted` during the calibration.
+    """
+    optics, lag = result.optics, result.lag
     pan, tilt = (was != (sign < 0) for was, sign in zip(inverted, optics.signs, strict=True))
     contents: dict[str, Any] = {
         'image_width': image_size[0],
@@ -25,12 +28,12 @@ def as_dict(
         'focal_length_y_px': _pair(optics.focal_y),
         'pan_inverted': pan,
         'tilt_inverted': tilt,
-        'pan_gain': _pair(found.pan_gain),
-        'tilt_gain': _pair(found.tilt_gain),
+        'pan_gain': _pair(result.pan_gain),
+        'tilt_gain': _pair(result.tilt_gain),
         'pan_backlash_rad': _pair(lag.backlash),
         'tilt_backlash_rad': _pair(optics.tilt_backlash),
     }
-    if lag.delay_s.error <= SUREST_DELAY_ERROR_S:
+    if lag.delay_s.error <= LARGEST_DELAY_ERROR_S:
         contents['camera_delay_s'] = _pair(lag.delay_s)
     return contents
 
@@ -43,5 +46,5 @@ def save(contents: dict[str, Any], path: Path) -> None:
     partial.replace(path)
 
 
-def _pair(figure: Figure) -> dict[str, float]:
-    return {'value': float(f'{figure.value:.5g}'), 'error': float(f'{figure.error:.2g}')}
+def _pair(fitted: FittedValue) -> dict[str, float]:
+    return {'value': float(f'{fitted.value:.5g}'), 'error': float(f'{fitted.error:.2g}')}

@@ -1,11 +1,11 @@
-"""Runs the node that calibrates, and ends it with the head at rest."""
+"""Run the calibration node until it has a result, and end it with the head at rest."""
 
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from ja_calibration.calibration_file import as_dict
-from ja_calibration.rig import CalibrationRig
+from ja_calibration.calibration_node import CalibrationNode
 from ja_common.executor import CachedWaitSetExecutor
 from ja_common.private_executor import own_executor
 
@@ -13,48 +13,49 @@ _BRAKING_S = 3.0
 
 
 def run_calibration(
-    arguments: Sequence[str], patience_s: float, say: Callable[[str], None]
+    arguments: Sequence[str], patience_s: float, report: Callable[[str], None]
 ) -> dict[str, Any]:
-    """What was found, as the file has it.
+    """Calibrate the head and return the contents of the file.
 
-    Raises ValueError where head or picture allow none, and KeyboardInterrupt when the head stands.
+    `report` receives a line of progress after each move. Raises ValueError where the head or the
+    images allow no calibration, and KeyboardInterrupt once the head stands still.
     """
-    # Ctrl-C does not end the context: the head is still to be braked.
+    # Ctrl-C must not end the context: the head has to brake first.
     with own_executor(arguments) as executor:
-        rig = CalibrationRig(context=executor.context)
-        executor.add_node(rig)
+        node = CalibrationNode(context=executor.context)
+        executor.add_node(node)
         try:
-            _spin_until_found(rig, executor, patience_s, say)
-            assert rig.conductor is not None
-            assert rig.conductor.found is not None
-            pan, tilt = (bool(sign < 0) for sign in rig.joints.signs)
-            return as_dict(rig.conductor.found, (pan, tilt), rig.image_size)
+            _spin_until_done(node, executor, patience_s, report)
+            assert node.sequence is not None
+            assert node.sequence.result is not None
+            pan, tilt = (bool(sign < 0) for sign in node.joints.signs)
+            return as_dict(node.sequence.result, (pan, tilt), node.image_size)
         finally:
-            _brake(rig, executor)
+            _brake(node, executor)
 
 
-def _spin_until_found(
-    rig: CalibrationRig,
+def _spin_until_done(
+    node: CalibrationNode,
     executor: CachedWaitSetExecutor,
     patience_s: float,
-    say: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> None:
-    done, went_on_s = -1, time.monotonic()
-    while rig.conductor is None or rig.conductor.found is None:
+    done, progress_s = -1, time.monotonic()
+    while node.sequence is None or node.sequence.result is None:
         executor.spin_once(timeout_sec=0.1)
-        now_done = -1 if rig.conductor is None else rig.conductor.orders_done
+        now_done = -1 if node.sequence is None else node.sequence.moves_done
         if now_done != done:
-            done, went_on_s = now_done, time.monotonic()
-            say(f'{done} moves done ...')
-        if time.monotonic() - went_on_s > patience_s:
-            why = f'last held because: {rig.last_hold}' if rig.last_hold else 'never held'
-            raise ValueError(f'nothing went on for {patience_s:g} s; the head was {why}')
+            done, progress_s = now_done, time.monotonic()
+            report(f'{done} moves done ...')
+        if time.monotonic() - progress_s > patience_s:
+            why = f'last held because: {node.last_hold}' if node.last_hold else 'never held'
+            raise ValueError(f'no progress for {patience_s:g} s; the head was {why}')
 
 
-def _brake(rig: CalibrationRig, executor: CachedWaitSetExecutor) -> None:
-    rig.stop()
-    # What the end was about has been said already.
-    rig.conductor = None
+def _brake(node: CalibrationNode, executor: CachedWaitSetExecutor) -> None:
+    node.stop()
+    # The error that ended the run is on its way already; do not raise a second one.
+    node.sequence = None
     end_s = time.monotonic() + _BRAKING_S
-    while not rig.at_rest and time.monotonic() < end_s:
+    while not node.at_rest and time.monotonic() < end_s:
         executor.spin_once(timeout_sec=0.1)

@@ -17,7 +17,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
-from ja_common.core.config import ConfigError
+from ja_common.core.config import ConfigError, Configuration
 from ja_common.core.health import Health, Level
 from ja_common.discovery_refresher import DiscoveryRefresher
 from ja_common.executor import CachedWaitSetExecutor
@@ -25,7 +25,7 @@ from ja_common.parameters import declare_config
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_common.topics import DIAGNOSTICS, Topic
 
-Config = TypeVar('Config')
+Config = TypeVar('Config', bound=Configuration)
 
 
 class GraphNode(Node):

@@ -9,6 +9,8 @@ from builtin_interfaces.msg import Time
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
+from ja_common.core.camera_model import CameraModel
+
 
 class ImageError(ValueError):
     """An image message that cannot be turned into a picture; the text says why."""
@@ -145,7 +147,7 @@ def encode_image(pixels: np.ndarray, stamp: Time, frame_id: str) -> Image:
 def encode_camera_info(
     header: Header, width: int, height: int, fx: float, fy: float | None = None
 ) -> CameraInfo:
-    """Calibration of an ideal camera: axis through the centre, no distortion.
+    """Return the calibration of an ideal camera: axis through the centre, no distortion.
 
     `fx`, `fy`: focal lengths [px]; the pixels are square where only one is given.
     """
@@ -157,3 +159,17 @@ def encode_camera_info(
     info.r = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
     info.p = [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]
     return info
+
+
+def decode_camera_info(info: CameraInfo | None, width: int, height: int) -> CameraModel | None:
+    """Return the camera for images of `width` x `height` [px]; None where it is not calibrated.
+
+    A calibration for images of another size is scaled. Raises ValueError when its focal lengths
+    are not positive and finite.
+    """
+    if info is None:
+        return None
+    camera = CameraModel.from_calibration(
+        info.width or width, info.height or height, info.k, info.d
+    )
+    return None if camera is None else camera.resized(width, height)

@@ -7,11 +7,11 @@ from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 
 
 @dataclass(frozen=True)
-class JointConfig:
+class JointConfig(Configuration):
     """How the rig names its two joints, and which of them turn the other way."""
 
     pan_joint: str = parameter('pan', 'name of the pan joint in joint_states and joint_commands')

@@ -14,9 +14,9 @@ from rclpy.exceptions import InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ja_common.core.config import ConfigError, checked
+from ja_common.core.config import ConfigError, Configuration
 
-Config = TypeVar('Config')
+Config = TypeVar('Config', bound=Configuration)
 
 UNBOUNDED = 1e9
 """Stands in a descriptor for an end that a range does not have."""
@@ -42,7 +42,7 @@ def declare_config(
             declared = node.declare_parameter(
                 name, config_field.default, _descriptor(config_field, read_only=changed is None)
             )
-            values[name] = checked(config_field, declared.value)
+            values[name] = declared.value
         config = config_class(**values)
     except (ConfigError, InvalidParameterValueException) as error:
         raise ConfigError(f'{node.get_fully_qualified_name()}: parameters: {error}') from None
@@ -53,9 +53,7 @@ def declare_config(
 
     def updated(parameters: list[Parameter]) -> Config:
         ours = [p for p in parameters if p.name in config_fields]
-        return replace(  # type: ignore[type-var]
-            current, **{p.name: checked(config_fields[p.name], p.value) for p in ours}
-        )
+        return replace(current, **{p.name: p.value for p in ours})  # type: ignore[type-var]
 
     def judge(parameters: list[Parameter]) -> SetParametersResult:
         try:
@@ -87,7 +85,7 @@ def _descriptor(config_field: Any, read_only: bool) -> ParameterDescriptor:
     text = meta['description']
     if meta.get('choices'):
         text += f'{_CHOICES}{", ".join(meta["choices"])})'
-    # dynamic_typing lets `1` stand for `1.0`; `checked` then holds the type and the range.
+    # dynamic_typing lets `1` stand for `1.0`; the configuration then checks the type and the range.
     descriptor = ParameterDescriptor(
         name=config_field.name, description=text, dynamic_typing=True, read_only=read_only
     )

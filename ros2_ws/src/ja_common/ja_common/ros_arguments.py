@@ -6,9 +6,9 @@ from typing import Any
 import rclpy
 import yaml
 from rclpy.context import Context
-from rclpy.impl.implementation_singleton import rclpy_implementation as implementation
 
 from ja_common.core.config import ConfigError
+from ja_common.rclpy_private import RCLError, UnknownROSArgsError
 
 
 def parameter_arguments(parameters: Mapping[str, Any]) -> list[str]:
@@ -45,9 +45,9 @@ def check_ros_arguments(arguments: Sequence[str]) -> None:
             context=context,
             signal_handler_options=rclpy.SignalHandlerOptions.NO,
         )
-    except implementation.UnknownROSArgsError as error:
+    except UnknownROSArgsError as error:
         raise ConfigError(f'unknown ROS arguments: {error}') from None
-    except implementation.RCLError as error:
+    except RCLError as error:
         # "failed to initialize rcl: WHAT, at FILE:LINE, at ..."
         what = str(error).removeprefix('failed to initialize rcl: ').split(', at ')[0]
         raise ConfigError(f'ROS arguments: {what}') from None

@@ -1,4 +1,4 @@
-"""Commands as rigs take them: JointState, JointTrajectory, or Float64MultiArray."""
+"""Commands in the message of the rig: JointState, JointTrajectory or Float64MultiArray."""
 
 import math
 from dataclasses import dataclass
@@ -10,14 +10,14 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.core.stamps import NS_PER_S
 from ja_common.graph_node import GraphNode
 from ja_common.topics import FORWARD_COMMANDS, JOINT_COMMANDS, JOINT_TRAJECTORY
 
 
 @dataclass(frozen=True)
-class CommandOutputConfig:
+class CommandOutputConfig(Configuration):
     """Which message the rig obeys; `joint_commands` is published in any case."""
 
     output: str = parameter(
@@ -33,11 +33,11 @@ class CommandOutputConfig:
 
 
 class CommandOutput:
-    """Publishes each command on `joint_commands`, and once more as the rig's controller takes it.
+    """Publishes each command on `joint_commands`, and in the message of the rig's controller.
 
-    JointTrajectory: a single point with a stamp of zero, 'as soon as it comes', so that the
-    clocks of the two machines do not matter. Float64MultiArray: the numbers in the order of the
-    controller's `joints`.
+    JointTrajectory: a single point with a zero stamp, which means 'now': the clocks of the two
+    machines do not matter. Float64MultiArray: the numbers in the order of the controller's
+    `joints`.
     """
 
     def __init__(self, node: GraphNode, config: CommandOutputConfig) -> None:
@@ -49,7 +49,7 @@ class CommandOutput:
         )
 
     def publish(self, command: JointState) -> None:
-        """Send a command: names, position [rad], velocity [rad/s], in the rig's signs."""
+        """Publish a command: names, position [rad], velocity [rad/s], in the rig's signs."""
         self._joint_commands.publish(command)
         if self._controller is not None:
             self._controller.publish(self._for_controller(command))
@@ -60,8 +60,7 @@ class CommandOutput:
             return Float64MultiArray(data=list(command.position)[::step])
         fraction, whole = math.modf(self._config.time_from_start_s)
         start = Duration(sec=int(whole), nanosec=round(fraction * NS_PER_S))
-        # Without velocities: the point stands for itself, and a lost successor leaves the head
-        # at rest in it.
+        # Without velocities: when the next point is lost, the head comes to rest at this one.
         point = JointTrajectoryPoint(
             positions=np.asarray(command.position).tolist(), time_from_start=start
         )

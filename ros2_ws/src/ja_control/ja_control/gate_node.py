@@ -1,9 +1,7 @@
 """`gate`: arbitrates between visual feedback and the learner, and alone commands the head."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +12,14 @@ from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, Trigger
 
-from ja_common.core.config import ConfigError, parameter
+from ja_common.core.config import ConfigError, Configuration, parameter
 from ja_common.core.health import Level
 from ja_common.core.posture import REORDERED_WITHIN_S, Posture
-from ja_common.core.stamp_join import StampJoin
 from ja_common.core.stamps import NS_PER_S
 from ja_common.graph_node import GraphNode, spin_node
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.point_cloud_codec import decode_columns
-from ja_common.posture_listener import PostureListener
-from ja_common.time_codec import to_ns
+from ja_common.synchroniser import StampedSet, Synchroniser
 from ja_common.topics import (
     EVIDENCE,
     FACE_DELTA,
@@ -34,20 +30,19 @@ from ja_common.topics import (
     LM_DELTA,
     ROBOT_DESCRIPTION,
     VF_DELTA,
-    Topic,
 )
 from ja_control.command_output import CommandOutput, CommandOutputConfig
 from ja_control.core.attention_cycle import (
     AttentionCycle,
     AttentionCycleConfig,
+    CycleInput,
     Decision,
-    Percept,
 )
 from ja_control.core.command_guard import Cause, Command, CommandGuard, CommandGuardConfig, Hold
 from ja_control.core.gating import Gating, GatingConfig
 from ja_control.core.joint_limits import JointLimitsConfig
 from ja_control.core.trial_count import load_trials, save_trials
-from ja_control.core.urdf_limits import narrowed, read_joint
+from ja_control.core.urdf_limits import narrow_limits, read_joint
 
 _PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, GLANCE_DELTA, FIXATION)
 # Longer than any image takes; a clock that is set forward is no time in which the head turns.
@@ -56,7 +51,7 @@ _STATUS_EVERY_S = 0.1
 
 
 @dataclass(frozen=True)
-class GateConfig:
+class GateConfig(Configuration):
     """What the gate needs beyond the cycle, the gating and the guard."""
 
     seed: int = parameter(0, 'seed of the draws between VF and LM', low=0)
@@ -111,8 +106,6 @@ class GateNode(GraphNode):
         self._trials_file = self.folder_of_its_own(kept.parent) / kept.name
         self._cycle.trials = self._kept_trials()
 
-        self._postures = PostureListener(self, self._joints)
-        self._join = StampJoin([topic.name for topic in (*_PROPOSALS, EVIDENCE)])
         self._header = Header()
         self._stamp_ns = 0
         self._decision: Decision | None = None
@@ -121,11 +114,9 @@ class GateNode(GraphNode):
         self._hold: Hold | None = None
         self._told_s = -np.inf
 
-        for topic in _PROPOSALS:
-            self.subscribe(
-                topic, self._collector(topic, self._joints.decode), expected_every_s=2.0
-            )
-        self.subscribe(EVIDENCE, self._collector(EVIDENCE, _log_evidence), expected_every_s=2.0)
+        self._synchroniser = Synchroniser(self, self._joints)
+        deltas = dict.fromkeys(_PROPOSALS, self._joints.decode)
+        self._synchroniser.call_with({**deltas, EVIDENCE: _log_evidence}, self._act)
         self._output = CommandOutput(self, self.configure(CommandOutputConfig))
         self._status = self.create_topic_publisher(GATE_STATUS)
         self.advertise_service(SetBool, 'enable', self._on_enable)
@@ -170,19 +161,13 @@ class GateNode(GraphNode):
     def _narrow_limits(self) -> None:
         pan, tilt = (read_joint(self._urdf, name) for name in self._joints.names)
         joints = self._joints
-        self._guard.set_limits(narrowed(self._limits, pan, tilt, joints.signs, joints.offsets))
+        self._guard.set_limits(
+            narrow_limits(self._limits, pan, tilt, joints.signs, joints.offsets)
+        )
 
-    def _collector(self, topic: Topic, decode: Callable[[Any], Any]) -> Callable[[Any], None]:
-        def collect(message: Any) -> None:
-            stamp_ns = to_ns(message.header.stamp)
-            proposals = self._join.add(topic.name, stamp_ns, decode(message))
-            if proposals is not None:
-                self._postures.when_known(stamp_ns, partial(self._act, message.header, proposals))
-
-        return collect
-
-    def _act(self, header: Header, proposals: dict[str, Any], posture: Posture) -> None:
+    def _act(self, found: StampedSet) -> None:
         """Everybody has judged an image."""
+        posture = found.posture
         lockstep = self._config.lockstep
         step_s = (posture.stamp_ns - self._stamp_ns) / NS_PER_S
         if step_s == 0.0:
@@ -193,33 +178,33 @@ class GateNode(GraphNode):
         if -REORDERED_WITHIN_S < step_s < 0.0:
             return  # late: a newer image has been answered already
         if step_s < 0.0:
-            self._guard.begin_anew()  # the clock was set back
-        self._header, self._stamp_ns = header, posture.stamp_ns
+            self._guard.restart()  # the clock was set back
+        self._header, self._stamp_ns = found.header, posture.stamp_ns
         now_s = self._now_s()
-        self._guard.hear_image(now_s, self._age_s(posture.stamp_ns))
-        self._decision = self._decide(proposals, posture)
+        self._guard.record_image(now_s, self._age_s(posture.stamp_ns))
+        self._decision = self._decide(found)
         if lockstep:
             seconds = min(max(step_s, 0.0), _LONGEST_STEP_S)
             # Not the newest posture: which one that is depends on the scheduling.
             self._step(now_s, posture, max(1, round(seconds * self._config.control_rate_hz)))
 
-    def _decide(self, proposals: dict[str, Any], posture: Posture) -> Decision | None:
+    def _decide(self, found: StampedSet) -> Decision | None:
         if not self._guard.engaged:
             self._cycle.restart()
             return None
         trials = self._cycle.trials
         decision = self._cycle.step(
-            Percept(
-                posture,
-                face_delta=proposals[FACE_DELTA.name],
-                vf_delta=proposals[VF_DELTA.name],
-                lm_delta=proposals[LM_DELTA.name],
-                glance_delta=proposals[GLANCE_DELTA.name],
-                fixation=proposals[FIXATION.name],
-                log_evidence=proposals[EVIDENCE.name],
+            CycleInput(
+                found.posture,
+                face_delta=found[FACE_DELTA],
+                vf_delta=found[VF_DELTA],
+                lm_delta=found[LM_DELTA],
+                glance_delta=found[GLANCE_DELTA],
+                fixation=found[FIXATION],
+                log_evidence=found[EVIDENCE],
             )
         )
-        self._guard.aim(decision.target)
+        self._guard.set_target(decision.target)
         if decision.trials != trials and self._config.trials_file:
             save_trials(self._trials_file, decision.trials)
         return decision
@@ -235,13 +220,13 @@ class GateNode(GraphNode):
 
     def _on_period(self) -> None:
         try:
-            self._step(self._now_s(), self._postures.newest, 1)
+            self._step(self._now_s(), self._synchroniser.newest_posture, 1)
         except ValueError as error:
             self.problem('control', f'control: {error}')
 
     def _step(self, now_s: float, measured: Posture | None, periods: int) -> None:
         if measured is not None:
-            self._guard.hear_joints(measured.position, now_s, self._age_s(measured.stamp_ns))
+            self._guard.record_joints(measured.position, now_s, self._age_s(measured.stamp_ns))
         command = self._guard.step(now_s, periods)
         news = self._note_hold(command.hold)
         if self._config.lockstep and command.position is None and measured is not None:
@@ -267,8 +252,10 @@ class GateNode(GraphNode):
         """Keep why the head is held, with the topics that are missing; whether it is news."""
         news, self._guard_hold = hold != self._guard_hold, hold
         if news and hold is not None and hold.cause is Cause.SILENT:
-            behind = self._postures.is_behind
-            missing = [JOINT_STATES.name] if behind else sorted(self._join.missing())
+            behind = self._synchroniser.waits_for_posture
+            missing = (
+                [JOINT_STATES.name] if behind else sorted(self._synchroniser.missing_topics())
+            )
             hold = Hold(hold.cause, f'{hold.text}; missing: {", ".join(missing)}')
         if news:
             self._hold = hold

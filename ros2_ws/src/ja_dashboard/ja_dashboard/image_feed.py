@@ -18,10 +18,10 @@ from ja_common.core.fixation import WIDTH_SIXTH
 from ja_common.core.geometry import directions_of_rays
 from ja_common.core.posture import PostureHistory
 from ja_common.detection_codec import decode_detections
-from ja_common.image_codec import decode_image
+from ja_common.image_codec import decode_camera_info, decode_image
 from ja_common.joint_codec import JointCodec
 from ja_common.point_cloud_codec import decode_columns
-from ja_common.polled_subscription import Mailbox
+from ja_common.polled_subscription import PolledSubscription
 from ja_common.time_codec import to_ns
 from ja_common.topics import (
     BELIEF,
@@ -37,7 +37,7 @@ from ja_common.topics import (
     VF_DELTA,
     Topic,
 )
-from ja_dashboard.core.view_model import Glance, Truth, ViewModel
+from ja_dashboard.core.view_model import Glance, TruthView, ViewModel
 
 ALL_OF_ONE_LOOK = 50
 """So many messages may wait from look to look: all of 500 images a second, ten looks a second."""
@@ -75,14 +75,14 @@ class Picture:
         return cv2.imencode('.jpg', cv2.cvtColor(drawn, cv2.COLOR_RGB2BGR), quality)[1].tobytes()
 
 
-class Sight:
+class ImageFeed:
     """Everything that comes once an image; exists only while somebody looks."""
 
     def __init__(self, node: Node, model: ViewModel, joints: JointCodec) -> None:
         self._node = node
         self._model = model
         self._joints = joints
-        self.boxes = {topic: Mailbox(node, topic, depth) for topic, depth in _DEPTHS.items()}
+        self.boxes = {topic: PolledSubscription(node, topic, depth) for topic, depth in _DEPTHS.items()}
         self._postures = PostureHistory()
         self._pending: tuple[int, Any] | None = None
         self._sent_ns: dict[int, int] = {}
@@ -101,7 +101,7 @@ class Sight:
     def show_truth(self, shown: bool) -> None:
         """Hear the truth of the simulation, or not: unasked, none but the scorer hears it."""
         if shown and SIM_TRUTH not in self.boxes:
-            self.boxes[SIM_TRUTH] = Mailbox(self._node, SIM_TRUTH, 1)
+            self.boxes[SIM_TRUTH] = PolledSubscription(self._node, SIM_TRUTH, 1)
         elif not shown and SIM_TRUTH in self.boxes:
             self.boxes.pop(SIM_TRUTH).close()
 
@@ -110,12 +110,12 @@ class Sight:
 
         An image is shown once the detections on it are here.
         """
-        taken = {topic: box.take() for topic, box in self.boxes.items()} | {FIXATION: fixations}
+        taken = {topic: box.take_messages() for topic, box in self.boxes.items()} | {FIXATION: fixations}
         for message, _ in taken[CAMERA_INFO]:
             self._calibration = message
         for message, _ in taken[JOINT_STATES]:
             if (posture := self._joints.decode_posture(message)) is not None:
-                self._postures.add(to_ns(message.header.stamp), posture)
+                self._postures.record_posture(to_ns(message.header.stamp), posture)
         self._time(taken)
         found = {to_ns(message.header.stamp): message for message, _ in taken[DETECTIONS]}
         faces = {to_ns(message.header.stamp): message for message, _ in taken[FACE_IMAGE]}
@@ -183,11 +183,11 @@ class Sight:
             return np.column_stack(list(columns.values())).astype(float)
         return self.glance.belief if self.glance else np.zeros((0, 3))
 
-    def _truth(self, taken: list[tuple[PointCloud2, int]]) -> Truth | None:
+    def _truth(self, taken: list[tuple[PointCloud2, int]]) -> TruthView | None:
         if taken:
             c = decode_columns(taken[-1][0], ('x', 'y', 'z', 'pan', 'tilt', 'attended'))
             attended = np.flatnonzero(c['attended'])
-            return Truth(
+            return TruthView(
                 np.column_stack([c['x'], c['y'], c['z']]).astype(float),
                 np.column_stack([c['pan'], c['tilt']]).astype(float),
                 int(attended[0]) if len(attended) else -1,
@@ -196,12 +196,5 @@ class Sight:
 
     def _camera(self, image: NDArray[np.uint8]) -> CameraModel:
         height, width = image.shape[:2]
-        info = self._calibration
-        camera = None
-        if info is not None:
-            camera = CameraModel.from_calibration(
-                info.width or width, info.height or height, info.k, info.d
-            )
-        if camera is None:
-            return CameraModel.from_field_of_view(width, height, _ASSUMED_VIEW_RAD)
-        return camera.resized(width, height)
+        camera = decode_camera_info(self._calibration, width, height)
+        return camera or CameraModel.from_field_of_view(width, height, _ASSUMED_VIEW_RAD)

@@ -8,16 +8,19 @@ from nicegui import ui
 
 from ja_common.core.health import Level
 from ja_dashboard.core import drawings
-from ja_dashboard.core.view_model import CurvePoints, Light, Run
+from ja_dashboard.core.view_model import CurvePoints, Light, RunState
 
 PICTURE_URL = '/picture.jpg'
 _PICTURE_EVERY_S = 0.1
 _REST_EVERY_S = 0.25
 _SPEEDS = {0.0: 'as fast as it can', 0.25: '¼ x', 0.5: '½ x', 1.0: '1 x', 2.0: '2 x', 5.0: '5 x'}
 _COLOURS = {
-    Run.WAITING: 'grey', Run.RUNNING: 'green', Run.PAUSED: 'blue', Run.HELD: 'orange',
-    Run.STOPPED: 'red',
-}  # fmt: skip
+    RunState.WAITING: 'grey',
+    RunState.RUNNING: 'green',
+    RunState.PAUSED: 'blue',
+    RunState.HELD: 'orange',
+    RunState.STOPPED: 'red',
+}
 _LIGHT_COLOURS = {
     Level.OK: '#22c55e', Level.WARN: '#f59e0b', Level.ERROR: '#ef4444', Level.STALE: '#64748b',
 }  # fmt: skip
@@ -39,7 +42,7 @@ body { background: #0f172a }
 """
 
 
-class Robot(Protocol):
+class PageModel(Protocol):
     """Who is shown: see `ViewNode`, which is one."""
 
     @property
@@ -54,18 +57,18 @@ class Robot(Protocol):
 class Page:
     """Makes the page for every browser that opens it."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: PageModel) -> None:
         self._robot = robot
 
     def build(self) -> None:
         """Called once a browser."""
-        _View(self._robot)
+        _OpenPage(self._robot)
 
 
-class _View:
+class _OpenPage:
     """One open page."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: PageModel) -> None:
         self._robot = robot
         self._shown_log = 0
         self._shown_stamp = 0
@@ -181,7 +184,7 @@ class _View:
         self._badge.props(f'color={_COLOURS[frame.state.run]}')
         self._why.set_text(frame.state.text)
         for shown in (self._picture, self._scene, self._postures):
-            old = not (frame.state.is_live or frame.state.run is Run.PAUSED)
+            old = not (frame.state.is_live or frame.state.run is RunState.PAUSED)
             shown.classes(add='ja-old' if old else '', remove='' if old else 'ja-old')
         if frame.glance is not None:
             self._scene.set_content(drawings.from_above(frame.glance))

@@ -9,7 +9,7 @@ from fastapi import FastAPI, Response
 from nicegui import ui
 
 from ja_common.core.config import ConfigError
-from ja_dashboard.page import PICTURE_URL, Page, Robot
+from ja_dashboard.page import PICTURE_URL, Page, PageModel
 
 _GRACE_S = 1
 _PORTS = 50
@@ -18,7 +18,7 @@ _PORTS = 50
 class Server(threading.Thread):
     """Web server of the live page, as a context manager; `address` is what to open."""
 
-    def __init__(self, robot: Robot, host: str, port: int) -> None:
+    def __init__(self, robot: PageModel, host: str, port: int) -> None:
         """Take the port, or the next one that is free. Raises ConfigError when none is."""
         super().__init__(name='web server', daemon=True)
         self._socket = _listen(host, port)
@@ -40,14 +40,14 @@ class Server(threading.Thread):
         self.join(2 * _GRACE_S)
 
 
-def web_app(robot: Robot) -> FastAPI:
+def web_app(robot: PageModel) -> FastAPI:
     """The page of a robot, and its picture."""
     app = picture_app(robot)
     ui.run_with(app, root=Page(robot).build, title='Joint attention', dark=True)
     return app
 
 
-def picture_app(robot: Robot) -> FastAPI:
+def picture_app(robot: PageModel) -> FastAPI:
     """The newest picture as JPEG, drawn when it is asked for: the browser sets the pace.
 
     Who asks for it watches the robot.

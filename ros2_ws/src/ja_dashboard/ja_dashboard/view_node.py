@@ -20,17 +20,17 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.core.health import Level
 from ja_common.core.live_page import LIVE_PAGE
 from ja_common.graph_node import GraphNode, spin_node
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.parameters import choices_of
-from ja_common.polled_subscription import Mailbox
+from ja_common.polled_subscription import PolledSubscription
 from ja_common.status_values import status_values
 from ja_common.topics import DIAGNOSTICS, EVERY_SCORE, FIXATION, GATE_STATUS, LOG, Topic
 from ja_dashboard.core.view_model import CurvePoints, Glance, Light, State, ViewModel
-from ja_dashboard.image_feed import ALL_OF_ONE_LOOK, LIMITS, Picture, Sight
+from ja_dashboard.image_feed import ALL_OF_ONE_LOOK, LIMITS, ImageFeed, Picture
 
 LOOK_EVERY_S = 0.1
 _ASK_EVERY_S = 2.0
@@ -49,7 +49,7 @@ _SETTINGS = {
 
 
 @dataclass(frozen=True)
-class ViewConfig:
+class ViewConfig(Configuration):
     """Where the page is served."""
 
     host: str = parameter('127.0.0.1', 'address of the page; 0.0.0.0 serves it to everybody')
@@ -88,7 +88,7 @@ class ViewNode(GraphNode):
         self.config = self.configure(ViewConfig)
         self._joints = JointCodec(self.configure(JointConfig))
         self._model = ViewModel(time.monotonic())
-        self._sight: Sight | None = None
+        self._sight: ImageFeed | None = None
         self._orders: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._watched_s = -math.inf
         self._truth_shown = False
@@ -100,8 +100,8 @@ class ViewNode(GraphNode):
         }
         self._switches = {name: self.create_client(SetBool, name) for name in _SWITCHES}
         self._triggers = {name: self.create_client(Trigger, name) for name in _TRIGGERS}
-        self._fixations = Mailbox(self, FIXATION, ALL_OF_ONE_LOOK)
-        self._statuses = Mailbox(self, GATE_STATUS, ALL_OF_ONE_LOOK)
+        self._fixations = PolledSubscription(self, FIXATION, ALL_OF_ONE_LOOK)
+        self._statuses = PolledSubscription(self, GATE_STATUS, ALL_OF_ONE_LOOK)
         self.subscribe(EVERY_SCORE, self._on_score)
         self.subscribe(DIAGNOSTICS, self._on_diagnostics)
         self.subscribe(LOG, self._on_log)
@@ -117,7 +117,7 @@ class ViewNode(GraphNode):
         super().destroy_node()
 
     @property
-    def mailboxes(self) -> dict[Topic, Mailbox]:
+    def mailboxes(self) -> dict[Topic, PolledSubscription]:
         """What is heard at the moment without waking the executor."""
         always = {FIXATION: self._fixations, GATE_STATUS: self._statuses}
         return always | (self._sight.boxes if self._sight is not None else {})
@@ -148,10 +148,10 @@ class ViewNode(GraphNode):
             self._orders.get()()
         now_s = time.monotonic()
         self._open_or_close_eyes(now_s)
-        fixations = self._fixations.take()
+        fixations = self._fixations.take_messages()
         if any(message.name for message, _ in fixations):
             self._model.hear_fixation()
-        for message, _ in self._statuses.take():
+        for message, _ in self._statuses.take_messages():
             self._model.hear_gate(status_values(message))
         if self._sight is not None:
             if self._limits is not None:
@@ -164,7 +164,7 @@ class ViewNode(GraphNode):
         watched = now_s - self._watched_s < _WATCHED_FOR_S
         if watched and self._sight is None:
             self._model.watch(now_s)
-            self._sight = Sight(self, self._model, self._joints)
+            self._sight = ImageFeed(self, self._model, self._joints)
             self._ask_parameters()
         elif not watched and self._sight is not None:
             self._sight.close()

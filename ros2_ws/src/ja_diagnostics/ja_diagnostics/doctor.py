@@ -1,4 +1,4 @@
-"""`./ja doctor`: is everything there that the graph needs, and how to mend what is not."""
+"""The checks of `./ja doctor`: is what the graph needs there, and how to fix what is not?"""
 
 import errno
 import glob
@@ -9,8 +9,11 @@ import socket
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+
+import psutil
 
 from ja_diagnostics import image_stream
 
@@ -26,20 +29,20 @@ print(world.observe().image.std() > 0)
 
 @dataclass(frozen=True)
 class Finding:
-    """What one check found. `mend`: what to do; '' when nothing is wrong.
+    """What one check found. `fix`: what to do; '' when nothing is wrong.
 
-    `needed`: does the simulated head need it? A camera that is missing is no illness.
+    `needed`: does the simulated head need it? It needs no camera, for example.
     """
 
     name: str
-    well: bool
+    ok: bool
     text: str
-    mend: str = ''
+    fix: str = ''
     needed: bool = True
 
 
 def checks() -> dict[str, Callable[[], Finding]]:
-    """All checks by name, in the order in which one depends on another."""
+    """Return all checks by name, in the order in which one depends on another."""
     return {
         'Python': check_python,
         'rclpy': check_rclpy,
@@ -53,37 +56,40 @@ def checks() -> dict[str, Callable[[], Finding]]:
 
 
 def check_python() -> Finding:
+    """Check the version of Python."""
     version = sys.version_info[:2]
     text = '.'.join(map(str, version))
-    well = _PYTHONS[0] <= version <= _PYTHONS[1]
-    return Finding('Python', well, text, '' if well else 'set JA_PYTHON to a Python 3.10 to 3.13')
+    ok = _PYTHONS[0] <= version <= _PYTHONS[1]
+    return Finding('Python', ok, text, '' if ok else 'set JA_PYTHON to a Python 3.10 to 3.13')
 
 
 def check_rclpy() -> Finding:
+    """Check that rclpy can be imported, and that its middleware is Fast DDS."""
     try:
         import rclpy
 
         middleware = rclpy.get_rmw_implementation_identifier()
     except Exception as error:
-        mend = 'delete .venv and run ./ja again; with ROS sourced, use the Python it is made for'
-        return Finding('rclpy', False, f'{type(error).__name__}: {error}', mend)
-    well = middleware == 'rmw_fastrtps_cpp'
-    mend = '' if well else 'unset RMW_IMPLEMENTATION: only Fast DDS is tested'
-    return Finding('rclpy', well, f'{Path(rclpy.__file__).parent}, {middleware}', mend)
+        fix = 'delete .venv and run ./ja again; with ROS sourced, use the Python it is made for'
+        return Finding('rclpy', False, f'{type(error).__name__}: {error}', fix)
+    ok = middleware == 'rmw_fastrtps_cpp'
+    fix = '' if ok else 'unset RMW_IMPLEMENTATION: only Fast DDS is tested'
+    return Finding('rclpy', ok, f'{Path(rclpy.__file__).parent}, {middleware}', fix)
 
 
 def check_shared_memory(folder: Path = Path('/dev/shm')) -> Finding:
+    """Check that shared memory can be written and has room for images."""
     if not os.access(folder, os.W_OK):
-        mend = f'mount a tmpfs at {folder}; until then images go over UDP, slowly'
-        return Finding('shared memory', False, f'{folder} cannot be written', mend)
+        fix = f'mount a tmpfs at {folder}; until then images go over UDP, slowly'
+        return Finding('shared memory', False, f'{folder} cannot be written', fix)
     free_mb = shutil.disk_usage(folder).free // 10**6
-    well = free_mb >= _SHM_MB
-    mend = '' if well else 'remove stale segments, or give a container more (--shm-size=512m)'
-    return Finding('shared memory', well, f'{free_mb} MB free in {folder}', mend)
+    ok = free_mb >= _SHM_MB
+    fix = '' if ok else 'remove stale segments, or give a container more (--shm-size=512m)'
+    return Finding('shared memory', ok, f'{free_mb} MB free in {folder}', fix)
 
 
 def check_stale_segments(folder: Path = Path('/dev/shm')) -> Finding:
-    """Segments of Fast DDS that no living process has mapped or open; harmless but large."""
+    """Look for segments of Fast DDS that no process has mapped or open; harmless but large."""
     files = {Path(path) for path in glob.glob(f'{folder}/fastrtps_*')}
     used = _files_in_use()
     stale = sorted(
@@ -92,57 +98,64 @@ def check_stale_segments(folder: Path = Path('/dev/shm')) -> Finding:
     if not stale:
         return Finding('stale segments', True, 'none')
     size_mb = sum(path.stat().st_blocks * 512 for path in stale if path.exists()) / 1e6
-    mend = f'when no ROS 2 program runs: rm {folder}/fastrtps_* {folder}/sem.fastrtps_*'
+    fix = f'when no ROS 2 program runs: rm {folder}/fastrtps_* {folder}/sem.fastrtps_*'
     text = f'{len(stale)} left behind by killed processes, {size_mb:.1f} MB'
-    return Finding('stale segments', size_mb < _SHM_MB, text, mend, needed=False)
+    return Finding('stale segments', size_mb < _SHM_MB, text, fix, needed=False)
 
 
 def check_ports() -> Finding:
+    """Check the ROS_DOMAIN_ID, and whether its first UDP port is free."""
     domain = int(os.environ.get('ROS_DOMAIN_ID') or 0)
     port = 7400 + 250 * domain + 10  # unicast discovery of the first participant (DDSI-RTPS)
     if not 0 <= domain <= 101:
-        mend = 'choose ROS_DOMAIN_ID from 0 to 101: above, the ports collide with the system'
-        return Finding('ports', False, f'domain {domain}', mend)
+        fix = 'choose ROS_DOMAIN_ID from 0 to 101: above, the ports collide with the system'
+        return Finding('ports', False, f'domain {domain}', fix)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as test:
         try:
             test.bind(('127.0.0.1', port))
         except OSError as error:
             if error.errno != errno.EADDRINUSE:
-                mend = 'allow UDP on the loopback interface'
-                return Finding('ports', False, f'UDP {port}: {error.strerror}', mend)
+                fix = 'allow UDP on the loopback interface'
+                return Finding('ports', False, f'UDP {port}: {error.strerror}', fix)
             text = f'domain {domain}: in use, another ROS 2 graph runs there'
-            mend = 'for a graph of your own choose another ROS_DOMAIN_ID'
-            return Finding('ports', True, text, mend, needed=False)
+            fix = 'for a graph of your own choose another ROS_DOMAIN_ID'
+            return Finding('ports', True, text, fix, needed=False)
     return Finding('ports', True, f'domain {domain}: free, UDP from {port}')
 
 
 def check_discovery() -> Finding:
-    """Images from one process to another."""
+    """Send images from one process to another, and count those that arrive."""
     command = [sys.executable, '-m', image_stream.__name__]
-    hear = subprocess.Popen(
-        [*command, 'hear'], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    receiver = subprocess.Popen(
+        [*command, image_stream.RECEIVE],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
     )
-    say = subprocess.Popen(
-        [*command, 'say'], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    publisher = subprocess.Popen(
+        [*command, image_stream.PUBLISH],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
     )
     try:
-        found_s = json.loads(say.communicate(timeout=60)[0])['discovery_s']
-        delays_ms = json.loads(hear.communicate(timeout=60)[0])['delays_ms']
+        found_s = json.loads(publisher.communicate(timeout=60)[0])['discovery_s']
+        delays_ms = json.loads(receiver.communicate(timeout=60)[0])['delays_ms']
     except (ValueError, KeyError, subprocess.TimeoutExpired):
-        mend = 'unset FASTRTPS_DEFAULT_PROFILES_FILE and ROS_AUTOMATIC_DISCOVERY_RANGE'
-        return Finding('discovery', False, 'two processes did not find each other', mend)
+        fix = 'unset FASTRTPS_DEFAULT_PROFILES_FILE and ROS_AUTOMATIC_DISCOVERY_RANGE'
+        return Finding('discovery', False, 'two processes did not find each other', fix)
     finally:
-        for process in (hear, say):
+        for process in (receiver, publisher):
             process.kill()
             process.wait()
     share = len(delays_ms) / image_stream.IMAGES
     text = f'found in {found_s:.2f} s, {share:.0%} of 640x480 images at 60 Hz arrived'
-    mend = '' if share > 0.9 else 'the machine is busy, or shared memory is not used: see above'
-    return Finding('discovery', share > 0.5, text, mend)
+    fix = '' if share > 0.9 else 'the machine is busy, or shared memory is not used: see above'
+    return Finding('discovery', share > 0.5, text, fix)
 
 
 def check_graphics() -> Finding:
-    """In a process of its own: a broken driver may end it."""
+    """Render one image in a separate process, because a broken driver may end it."""
     found = subprocess.run(
         [sys.executable, '-c', _RENDER], capture_output=True, text=True, check=False
     )
@@ -150,28 +163,28 @@ def check_graphics() -> Finding:
         backend = os.environ.get('MUJOCO_GL') or 'chosen by the sim'
         return Finding('graphics', True, f'an image is rendered (MUJOCO_GL: {backend})')
     lines = found.stderr.strip().splitlines() or [f'exit code {found.returncode}']
-    mend = 'sudo apt-get install -y libegl1 libgl1-mesa-dri, or libosmesa6 and MUJOCO_GL=osmesa'
-    return Finding('graphics', False, lines[-1], mend)
+    fix = 'sudo apt-get install -y libegl1 libgl1-mesa-dri, or libosmesa6 and MUJOCO_GL=osmesa'
+    return Finding('graphics', False, lines[-1], fix)
 
 
 def check_camera() -> Finding:
+    """Look for cameras that this user may open."""
     devices = sorted(glob.glob('/dev/video*'))
     readable = [device for device in devices if os.access(device, os.R_OK | os.W_OK)]
     if readable:
         return Finding('camera', True, ', '.join(readable), needed=False)
     if devices:
-        mend = 'sudo usermod -aG video $USER, and log in again'
-        return Finding('camera', False, f'{", ".join(devices)}: no permission', mend, needed=False)
-    mend = 'not needed for ./ja demo; ./ja rig --source takes a video file or a folder, too'
-    return Finding('camera', False, 'none', mend, needed=False)
+        fix = 'sudo usermod -aG video $USER, and log in again'
+        return Finding('camera', False, f'{", ".join(devices)}: no permission', fix, needed=False)
+    fix = 'not needed for ./ja demo; ./ja rig --source also takes a video file or a folder'
+    return Finding('camera', False, 'none', fix, needed=False)
 
 
 def _files_in_use() -> set[str]:
-    used = set()
-    for maps in glob.glob('/proc/[0-9]*/maps'):
-        try:
-            lines = Path(maps).read_text().splitlines()
-        except OSError:
-            continue  # ended meanwhile, or another user's
-        used |= {line.split(maxsplit=5)[-1] for line in lines if '/fastrtps_' in line}
+    """Return the paths of the Fast DDS segments that any process has mapped."""
+    used: set[str] = set()
+    for process in psutil.process_iter():
+        with suppress(psutil.Error):  # it has ended meanwhile, or belongs to another user
+            paths = (mapped.path for mapped in process.memory_maps())
+            used |= {path for path in paths if '/fastrtps_' in path}
     return used

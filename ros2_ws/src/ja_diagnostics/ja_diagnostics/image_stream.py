@@ -1,4 +1,7 @@
-"""A talker and a listener of images, `say` or `hear`, each a process; figures on stdout."""
+"""A publisher and a receiver of images, each its own process; they print figures as JSON.
+
+`python -m ja_diagnostics.image_stream publish_images` (or `receive_images`).
+"""
 
 import json
 import sys
@@ -19,11 +22,13 @@ IMAGES = 240
 RATE_HZ = 60.0
 SHAPE = (480, 640, 3)
 _PATIENCE_S = 30.0
+# The words of the command line.
+PUBLISH, RECEIVE = 'publish_images', 'receive_images'
 
 
-def say() -> dict[str, float]:
-    """Wait for the listener, then send it images; the seconds until it was found."""
-    node, executor = _node('say')
+def publish_images() -> dict[str, float]:
+    """Wait for the receiver, then send it images; return the seconds until it was found."""
+    node, executor = _node('image_publisher')
     publisher = node.create_publisher(IMAGE.type, IMAGE.name, IMAGE.publisher_qos)
     began_s = time.monotonic()
     _spin_until(executor, lambda: publisher.get_subscription_count() > 0)
@@ -37,22 +42,22 @@ def say() -> dict[str, float]:
     return {'discovery_s': discovery_s}
 
 
-def hear() -> dict[str, list[float]]:
-    """Delays [ms] of the images that arrived, until none has come for a second."""
-    node, executor = _node('hear')
+def receive_images() -> dict[str, list[float]]:
+    """Return the delays [ms] of the images that arrive, until none has come for a second."""
+    node, executor = _node('image_receiver')
     delays_ms: list[float] = []
 
     def on_image(message: Image) -> None:
         delays_ms.append(1e-6 * (time.monotonic_ns() - to_ns(message.header.stamp)))
 
     node.create_subscription(IMAGE.type, IMAGE.name, on_image, IMAGE.subscriber_qos)
-    print('listening', file=sys.stderr, flush=True)
+    print('subscribed', file=sys.stderr, flush=True)
     _spin_until(executor, lambda: delays_ms)
-    heard, since_s = 0, time.monotonic()
+    count, since_s = 0, time.monotonic()
     while time.monotonic() - since_s < 1.0:
         executor.spin_once(timeout_sec=0.1)
-        if len(delays_ms) > heard:
-            heard, since_s = len(delays_ms), time.monotonic()
+        if len(delays_ms) > count:
+            count, since_s = len(delays_ms), time.monotonic()
     return {'delays_ms': delays_ms}
 
 
@@ -68,10 +73,10 @@ def _spin_until(executor: SingleThreadedExecutor, condition: Callable[[], object
     end_s = time.monotonic() + _PATIENCE_S
     while not condition():
         if time.monotonic() > end_s:
-            sys.exit(f'the other process was not heard of within {_PATIENCE_S:g} s')
+            sys.exit(f'the other process did not appear within {_PATIENCE_S:g} s')
         executor.spin_once(timeout_sec=0.001)
 
 
 if __name__ == '__main__':
-    print(json.dumps({'say': say, 'hear': hear}[sys.argv[1]]()))
+    print(json.dumps({PUBLISH: publish_images, RECEIVE: receive_images}[sys.argv[1]]()))
     rclpy.shutdown()

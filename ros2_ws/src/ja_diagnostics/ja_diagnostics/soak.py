@@ -1,33 +1,32 @@
-"""The whole graph for a long time: does anything grow, slow down, or get lost? (`./ja soak`)
+"""Run the whole graph for a long time: does anything grow, slow down, or get lost? (`./ja soak`)
 
-Memory and processor time of every node are read from /proc, the rates at which it hears its topics
-from /diagnostics: a rate below that of the camera is images lost.
+psutil measures memory and processor time of every node. /diagnostics gives the rates at which it
+receives its topics: a rate below that of the camera means lost images.
 """
 
-import os
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import psutil
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 
 from ja_common.graph_node import GraphNode
 from ja_common.private_executor import own_executor
 from ja_common.topics import DIAGNOSTICS
-from ja_runner.graph import NodeSpec
+from ja_runner.node_spec import NodeSpec
 from ja_runner.supervisor import Supervisor
 
 COLUMNS = ('what', 'begin', 'end', 'growth an hour', 'unit')
 _SAMPLE_EVERY_S = 10.0
-# Caches fill, and the learner's memory of trials, before anything is called growth.
+# Caches and the learner's memory of trials fill first; that is not counted as growth.
 _WARM_UP_SHARE = 1 / 3
 _MB = 2**20
-_TICKS_S = os.sysconf('SC_CLK_TCK')
-_PAGE = os.sysconf('SC_PAGE_SIZE')
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,10 @@ class Series:
     values: list[float]
 
     def row(self) -> tuple[str, ...]:
-        """As shown to people, below `COLUMNS`: means of the warm run's first and last third."""
+        """Return the row of the table with `COLUMNS`.
+
+        `begin` and `end` are the means over the first and the last third of the warm run.
+        """
         times, values = np.array(self.times_s), np.array(self.values)
         warm = times >= times[0] + _WARM_UP_SHARE * (times[-1] - times[0])
         times, values = times[warm], values[warm]
@@ -51,7 +53,7 @@ class Series:
 
 
 class Rates(GraphNode):
-    """The rates at which the nodes hear their topics, by their own report."""
+    """A node that collects the rates [1/s] at which the nodes report to receive their topics."""
 
     def __init__(self, context: Context) -> None:
         super().__init__('soak', context=context)
@@ -63,11 +65,11 @@ class Rates(GraphNode):
             for pair in status.values:
                 if pair.key.endswith(' rate [1/s]'):
                     topic = pair.key.removesuffix(' rate [1/s]')
-                    self.rates[f'{status.name} hears {topic}'] = float(pair.value)
+                    self.rates[f'{status.name} receives {topic}'] = float(pair.value)
 
 
 class Soak:
-    """Runs a graph, a process a node, for so long, and samples it."""
+    """A graph with one process for each node, and samples of its use of the machine."""
 
     def __init__(self, graph: list[NodeSpec], folder: Path, report: Callable[[str], None]) -> None:
         self._folder = folder
@@ -77,7 +79,7 @@ class Soak:
         self._sampled_s = 0.0
 
     def run(self, seconds: float) -> int:
-        """The exit code of the graph; the figures are in `series` afterwards."""
+        """Run the graph for so many seconds and sample it; return the exit code of the graph."""
         with own_executor() as executor:
             rates = Rates(executor.context)
             executor.add_node(rates)
@@ -93,30 +95,30 @@ class Soak:
             return self._supervisor.run(tick)
 
     def series(self) -> list[Series]:
-        """All figures, by what they are of."""
+        """Return all figures, sorted by unit and name."""
         return [self._samples[key] for key in sorted(self._samples)]
 
     def _sample(self, now_s: float, rates: Rates) -> None:
         elapsed_s, self._sampled_s = now_s - self._sampled_s, now_s
         shared: set[str] = set()
-        for thing, pid in self._supervisor.pids.items():
-            process = Path(f'/proc/{pid}')
-            resident = int((process / 'statm').read_text().split()[1]) * _PAGE
-            times = (process / 'stat').read_text().rsplit(')', 1)[1].split()
-            busy_s = (int(times[11]) + int(times[12])) / _TICKS_S
-            self._add(now_s, f'memory of {thing}', 'MB', resident / _MB)
-            if self._busy_s[thing]:
-                share = 100.0 * (busy_s - self._busy_s[thing]) / elapsed_s
-                self._add(now_s, f'processor, {thing}', '%', share)
-            self._busy_s[thing] = busy_s
-            lines = (process / 'maps').read_text().splitlines()
-            shared |= {line.split()[-1] for line in lines if '/dev/shm/' in line}
-        self._add(now_s, 'shared memory', 'MB', _size(map(Path, shared)) / _MB)
-        self._add(now_s, 'folder of the run', 'MB', _size(self._folder.rglob('*')) / _MB)
+        for name, pid in self._supervisor.pids.items():
+            process = psutil.Process(pid)
+            times = process.cpu_times()
+            busy_s = times.user + times.system
+            self._add_sample(now_s, f'memory of {name}', 'MB', process.memory_info().rss / _MB)
+            if self._busy_s[name]:
+                share = 100.0 * (busy_s - self._busy_s[name]) / elapsed_s
+                self._add_sample(now_s, f'processor, {name}', '%', share)
+            self._busy_s[name] = busy_s
+            with suppress(psutil.Error):  # it has just died; the supervisor reports it next
+                paths = (mapped.path for mapped in process.memory_maps())
+                shared |= {path for path in paths if path.startswith('/dev/shm/')}
+        self._add_sample(now_s, 'shared memory', 'MB', _size(map(Path, shared)) / _MB)
+        self._add_sample(now_s, 'folder of the run', 'MB', _size(self._folder.rglob('*')) / _MB)
         for name, rate in rates.rates.items():
-            self._add(now_s, f'rate, {name}', '1/s', rate)
+            self._add_sample(now_s, f'rate, {name}', '1/s', rate)
 
-    def _add(self, now_s: float, name: str, unit: str, value: float) -> None:
+    def _add_sample(self, now_s: float, name: str, unit: str, value: float) -> None:
         series = self._samples.setdefault((unit, name), Series(name, unit, [], []))
         series.times_s.append(now_s)
         series.values.append(value)

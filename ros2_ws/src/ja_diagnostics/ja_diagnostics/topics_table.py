@@ -1,4 +1,4 @@
-"""`./ja topics`: what the running graph says, how, how often, and what for."""
+"""The table of `./ja topics`: what the running graph publishes, how, how often, and why."""
 
 import time
 from collections import Counter
@@ -34,8 +34,8 @@ class TopicRow:
     purpose: str
 
 
-def look_at_topics(seconds: float, arguments: Sequence[str] = ()) -> list[TopicRow]:
-    """Watch the graph for a while; its topics by name. Empty: nobody is there."""
+def measure_topics(seconds: float, arguments: Sequence[str] = ()) -> list[TopicRow]:
+    """Watch the graph for some seconds; return its topics by name, none if no node is there."""
     context = Context()
     cli = ['--ros-args', *arguments] if arguments else []
     rclpy.init(args=cli, context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
@@ -44,18 +44,20 @@ def look_at_topics(seconds: float, arguments: Sequence[str] = ()) -> list[TopicR
     executor.add_node(node)
     try:
         _spin(executor, _DISCOVERY_S)
-        said = {
+        published = {
             name: types[0]
             for name, types in node.get_topic_names_and_types()
             if _others(node, node.get_publishers_info_by_topic(name))
         }
         counts: Counter[str] = Counter()
-        unknown = [name for name, kind in said.items() if not _count(node, name, kind, counts)]
+        unknown = [
+            name for name, kind in published.items() if not _count(node, name, kind, counts)
+        ]
         began_s = time.monotonic()
         _spin(executor, seconds)
         elapsed_s = time.monotonic() - began_s
-        rates = {name: None if name in unknown else counts[name] / elapsed_s for name in said}
-        return [_row(node, name, said[name], rates[name]) for name in sorted(said)]
+        rates = {name: None if name in unknown else counts[name] / elapsed_s for name in published}
+        return [_row(node, name, published[name], rates[name]) for name in sorted(published)]
     finally:
         executor.shutdown()
         node.destroy_node()
@@ -63,9 +65,9 @@ def look_at_topics(seconds: float, arguments: Sequence[str] = ()) -> list[TopicR
 
 
 def table_of_topics(rows: Sequence[TopicRow]) -> Table:
-    """For people."""
+    """Return the table that `./ja topics` prints."""
     table = Table(show_lines=False)
-    for column in ('topic', 'type', 'quality', 'publishers', 'heard by'):
+    for column in ('topic', 'type', 'quality', 'publishers', 'subscribers'):
         table.add_column(column, overflow='fold')
     table.add_column('Hz', justify='right')
     table.add_column('what it is', overflow='fold')
@@ -83,11 +85,11 @@ def _count(node: Node, name: str, type_name: str, counts: Counter[str]) -> bool:
     except ConfigError:
         return False
 
-    def heard(_: bytes) -> None:
+    def on_message(_: bytes) -> None:
         counts[name] += 1
 
-    # Best effort matches every publisher, and holds none up.
-    node.create_subscription(kind, name, heard, common_profile(False, False), raw=True)
+    # A best-effort subscription matches every publisher, and slows none down.
+    node.create_subscription(kind, name, on_message, common_profile(False, False), raw=True)
     return True
 
 
@@ -95,7 +97,7 @@ def _row(node: Node, name: str, type_name: str, rate_hz: float | None) -> TopicR
     publishers = _others(node, node.get_publishers_info_by_topic(name))
     subscribers = _others(node, node.get_subscriptions_info_by_topic(name))
     purposes = {topic.name.lstrip('/'): topic.purpose for topic in TOPICS}
-    # In a namespace, too: the longest of our names that it ends with.
+    # Works in a namespace too: the longest of our names that the name ends with.
     fitting = [own for own in purposes if f'/{name}'.endswith(f'/{own}')]
     return TopicRow(
         name,

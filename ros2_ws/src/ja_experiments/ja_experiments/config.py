@@ -7,14 +7,14 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from ja_common.core.config import ConfigError, checked, parameter
+from ja_common.core.config import ConfigError, Configuration, parameter
 from ja_control.core.attention_cycle import AttentionCycleConfig
 from ja_control.core.gating import GatingConfig
 from ja_control.core.joint_limits import JointLimitsConfig
 from ja_control.core.visual_feedback import VisualFeedbackConfig
 from ja_learning.core.evaluator import EvaluatorConfig
 from ja_learning.core.look_around import LookAroundConfig
-from ja_learning.core.network import NetworkConfig
+from ja_learning.core.network_config import NetworkConfig
 from ja_perception.core.salient_objects import InterestConfig
 
 IMAGE_PERIOD_S = 0.1
@@ -22,7 +22,7 @@ IMAGE_PERIOD_S = 0.1
 
 
 @dataclass(frozen=True)
-class TaskConfig:
+class TaskConfig(Configuration):
     """The simulated environment of section 3.1, and what is scored in it.
 
     Places of objects are drawn from the ranges of the scene in which the looks were rendered.
@@ -77,7 +77,6 @@ class ExperimentConfig:
             if not owners:
                 raise ConfigError(f'{name} is no parameter of the experiment')
             for key in owners:
-                value = checked(_parameters(parts[key])[name], value)
                 parts[key] = dataclasses.replace(parts[key], **{name: value})
         return ExperimentConfig(**parts)
 

@@ -1,30 +1,25 @@
 """`learning_module`: proposes where to look from the caregiver's face, and learns it online."""
 
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
-from sensor_msgs.msg import Image, JointState, PointCloud2
+from sensor_msgs.msg import Image
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
-from ja_common.core.config import parameter
-from ja_common.core.detection import caregiver_face, objects
+from ja_common.core.config import Configuration, parameter
+from ja_common.core.detection import Detection, caregiver_face, objects
 from ja_common.core.health import Level
-from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
-from ja_common.core.stamp_join import StampJoin
-from ja_common.core.stamp_ordered_dispatcher import StampOrderedDispatcher
+from ja_common.core.posture import STILL_BELOW_RAD_S
 from ja_common.detection_codec import decode_detections
 from ja_common.graph_node import GraphNode, spin_node
 from ja_common.image_codec import decode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.point_cloud_codec import encode_columns
-from ja_common.posture_listener import PostureListener
 from ja_common.realtime import enable_realtime_scheduling
-from ja_common.time_codec import to_ns
+from ja_common.synchroniser import StampedSet, Synchroniser
 from ja_common.topics import (
     BELIEF,
     DETECTIONS,
@@ -34,17 +29,18 @@ from ja_common.topics import (
     GLANCE_DELTA,
     LM_DELTA,
 )
-from ja_learning.core.gaze_line import GazeLineConfig
-from ja_learning.core.learner import Learner, LearnerChoice, make_learner
+from ja_learning.core.gaze_line_config import GazeLineConfig
+from ja_learning.core.learner import Learner
+from ja_learning.core.learner_registry import LearnerChoice, make_learner
 from ja_learning.core.learning_module import LearningModule
 from ja_learning.core.look_around import LookAroundConfig
-from ja_learning.core.network import NetworkConfig
+from ja_learning.core.network_config import NetworkConfig
 from ja_learning.core.trial import Trial, checked_face
 from ja_learning.persistent_learner import PersistentLearner
 
 
 @dataclass(frozen=True)
-class LearningModuleConfig:
+class LearningModuleConfig(Configuration):
     """What the node needs beyond the learner itself."""
 
     seed: int = parameter(0, 'seed of the initial weights', low=0)
@@ -87,13 +83,15 @@ class LearningModuleNode(GraphNode):
             self._config.still_below_rad_s,
             self._config.seed,
         )
-        self._postures = PostureListener(self, self._joints)
-        self._attended = StampJoin([FACE_IMAGE.name, DETECTIONS.name])
+        synchroniser = Synchroniser(self, self._joints)
         # First the proposal for an image, then its lesson, and only then the next proposal.
-        self._turns = StampOrderedDispatcher([DETECTIONS.name, FIXATION.name])
-        self.subscribe(FACE_IMAGE, self._on_face_image)
-        self.subscribe(DETECTIONS, self._on_detections, expected_every_s=2.0)
-        self.subscribe(FIXATION, self._on_fixation, expected_every_s=2.0)
+        synchroniser.call_with(
+            {DETECTIONS: decode_detections},
+            self._propose,
+            also={FACE_IMAGE: _decode_face},
+            also_when=_shows_attended_face,
+        )
+        synchroniser.call_with({FIXATION: self._joints.decode}, self._learn)
         self._delta = self.create_topic_publisher(LM_DELTA)
         self._glance_delta = self.create_topic_publisher(GLANCE_DELTA)
         self._evidence = self.create_topic_publisher(EVIDENCE)
@@ -126,44 +124,12 @@ class LearningModuleNode(GraphNode):
             self._learner.begin_anew()
             self._module.forget()
 
-    def _on_face_image(self, message: Image) -> None:
-        face = checked_face(decode_image(message)[..., 0])
-        self._when_attended(FACE_IMAGE.name, message.header, face)
-
-    def _on_detections(self, message: PointCloud2) -> None:
-        detections = decode_detections(message)
-        face = caregiver_face(detections)
+    def _propose(self, found: StampedSet) -> None:
+        header, detections = found.header, found[DETECTIONS]
         rays = np.array([seen.ray for seen in objects(detections)]).reshape(-1, 2)
-        if face is not None and face.attended:
-            self._when_attended(DETECTIONS.name, message.header, (rays, face.ray))
-        else:
-            propose = partial(self._propose, message.header, rays, None)
-            self._in_turn(DETECTIONS.name, message.header, propose)
-
-    def _when_attended(self, key: str, header: Header, value: Any) -> None:
-        both = self._attended.add(key, to_ns(header.stamp), value)
-        if both is not None:
-            (rays, ray), face = both[DETECTIONS.name], both[FACE_IMAGE.name]
-            propose = partial(self._propose, header, rays, (face, ray))
-            self._in_turn(DETECTIONS.name, header, propose)
-
-    def _in_turn(self, kind: str, header: Header, action: Callable[[Posture], None]) -> None:
-        """Act with the posture at the stamp, when all that comes first has acted."""
-        stamp_ns = to_ns(header.stamp)
-
-        def take_turn(posture: Posture) -> None:
-            self._turns.add(kind, stamp_ns, partial(action, posture))
-
-        self._postures.when_known(stamp_ns, take_turn)
-
-    def _propose(
-        self,
-        header: Header,
-        rays: np.ndarray,
-        attended: tuple[np.ndarray, np.ndarray] | None,
-        posture: Posture,
-    ) -> None:
-        proposal = self._module.see(posture, rays, attended)
+        face = caregiver_face(detections)
+        attended = (found[FACE_IMAGE], face.ray) if face is not None and face.attended else None
+        proposal = self._module.see(found.posture, rays, attended)
         if proposal.given_up is not None and self._learning:
             self._learner.learn(proposal.given_up)
         self._delta.publish(self._joints.encode(header, proposal.delta))
@@ -182,16 +148,13 @@ class LearningModuleNode(GraphNode):
         columns = {'pan': pan, 'tilt': tilt, 'weight': weight}
         self._belief.publish(encode_columns(header, columns))
 
-    def _on_fixation(self, message: JointState) -> None:
-        learn = partial(self._learn, self._joints.decode(message))
-        self._in_turn(FIXATION.name, message.header, learn)
-
-    def _learn(self, direction: np.ndarray | None, posture: Posture) -> None:
+    def _learn(self, found: StampedSet) -> None:
+        direction = found[FIXATION]
         if direction is None:
             return
-        trial = self._module.fixate(posture, direction)
+        trial = self._module.fixate(found.posture, direction)
         if trial is not None and self._learning:
-            self.teach(trial, posture.stamp_ns)
+            self.teach(trial, found.stamp_ns)
 
     def teach(self, trial: Trial, stamp_ns: int) -> None:
         """Learn from a trial that ended in a fixation on the image of this stamp."""
@@ -214,6 +177,15 @@ class LearningModuleNode(GraphNode):
         """What was lived is learned and saved before the end."""
         self._learner.close()
         super().destroy_node()
+
+
+def _decode_face(message: Image) -> np.ndarray:
+    return checked_face(decode_image(message)[..., 0])
+
+
+def _shows_attended_face(detections: list[Detection]) -> bool:
+    face = caregiver_face(detections)
+    return face is not None and face.attended
 
 
 def _share_the_interpreter() -> None:

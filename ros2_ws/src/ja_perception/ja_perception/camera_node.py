@@ -9,7 +9,7 @@ from rclpy.executors import ExternalShutdownException
 from std_msgs.msg import Header
 
 from ja_common.core.camera_model import CameraModel
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.graph_node import GraphNode, spin_node
 from ja_common.image_codec import encode_camera_info, encode_image
 from ja_common.topics import CAMERA_INFO, IMAGE
@@ -17,7 +17,7 @@ from ja_perception.core.frame_sources import SourceError, open_source
 
 
 @dataclass(frozen=True)
-class CameraConfig:
+class CameraConfig(Configuration):
     """Where the pictures come from, and how they are sent."""
 
     source: str = parameter(

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import Field, dataclass, fields, replace
 from typing import Any
 
@@ -10,21 +10,24 @@ import cv2
 import numpy as np
 from geometry_msgs.msg import Point, PointStamped
 from numpy.typing import NDArray
-from rclpy.clock import Clock, ClockType
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState
+from sensor_msgs.msg import CameraInfo, CompressedImage
 from std_msgs.msg import Header
 
 from ja_common.core.annotate import annotated
 from ja_common.core.camera_model import CameraModel
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.core.detection import Detection, caregiver_face
 from ja_common.core.health import Level
-from ja_common.core.posture import Posture, PostureHistory
 from ja_common.detection_codec import encode_detections
 from ja_common.graph_node import GraphNode, spin_node
-from ja_common.image_codec import decode_compressed, decode_image, encode_image
+from ja_common.image_codec import (
+    decode_camera_info,
+    decode_compressed,
+    decode_image,
+    encode_image,
+)
 from ja_common.joint_codec import JointCodec, JointConfig
-from ja_common.time_codec import to_ns
+from ja_common.synchroniser import StampedSet, Synchroniser
 from ja_common.topics import (
     CAMERA_INFO,
     DETECTIONS,
@@ -33,25 +36,14 @@ from ja_common.topics import (
     IMAGE,
     IMAGE_ANNOTATED,
     IMAGE_COMPRESSED,
-    JOINT_STATES,
     TARGET,
 )
-from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.detector import DetectorConfig, Percept, SalientFeatureDetector
-from ja_perception.core.faces import FaceFinder
-from ja_perception.core.haar import HaarFaces
-from ja_perception.core.template_faces import TemplateFaces
-from ja_perception.core.waiting_images import WaitingImages
-
-FACE_FINDERS: dict[str, Callable[[], FaceFinder]] = {
-    'blazeface': BlazeFace,
-    'haar': HaarFaces,
-    'template': lambda: TemplateFaces(BlazeFace()),
-}
+from ja_perception.core.face_finders import FACE_FINDERS
 
 
 @dataclass(frozen=True)
-class InputConfig:
+class InputConfig(Configuration):
     """What the node hears, and how long it waits for it."""
 
     face_finder: str = parameter(
@@ -85,9 +77,13 @@ class SalientFeatureDetectorNode(GraphNode):
         self._detector = SalientFeatureDetector(self._finder, self._config)
         self._seen: tuple[int, Percept] | None = None
         self._calibration: CameraInfo | None = None
-        self._postures = PostureHistory()
-        self._images: WaitingImages[Image | CompressedImage] = WaitingImages(
-            self._postures, self._input.posture_wait_s
+        silent_after_s = self._input.silent_after_s
+        self._synchroniser = Synchroniser(
+            self,
+            self._joints,
+            joints_expected_every_s=silent_after_s,
+            patience_s=self._input.posture_wait_s,
+            is_calibrated=lambda: self._calibration is not None,
         )
 
         self._says_detections = self.create_topic_publisher(DETECTIONS)
@@ -95,13 +91,13 @@ class SalientFeatureDetectorNode(GraphNode):
         self._says_face = self.create_topic_publisher(FACE)
         self._says_face_image = self.create_topic_publisher(FACE_IMAGE)
         self._says_annotated = self.create_topic_publisher(IMAGE_ANNOTATED)
-        image_topic = IMAGE_COMPRESSED if self._input.compressed else IMAGE
-        silent_after_s = self._input.silent_after_s
+        self._image_topic = IMAGE_COMPRESSED if self._input.compressed else IMAGE
         self.subscribe(CAMERA_INFO, self._on_camera_info, silent_after_s)
-        self.subscribe(JOINT_STATES, self._on_joint_states, silent_after_s)
-        self.subscribe(image_topic, self._on_image, silent_after_s)
-        # Wall time: it is for the case that the other messages do not come.
-        self.create_timer(0.1, self._see_ready, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._synchroniser.call_with(
+            {self._image_topic: lambda message: message},
+            self._detect,
+            expected_every_s=silent_after_s,
+        )
 
     def _tunable(self, part: Field) -> Any:
         """A part of the configuration that may change; the detector then starts anew."""
@@ -116,41 +112,27 @@ class SalientFeatureDetectorNode(GraphNode):
     def _on_camera_info(self, message: CameraInfo) -> None:
         CameraModel.from_calibration(message.width, message.height, message.k, message.d)
         self._calibration = message
-        self._see_ready()
+        self._synchroniser.call_ready()
 
-    def _on_joint_states(self, message: JointState) -> None:
-        position = self._joints.decode_posture(message)
-        if position is None:
-            raise ValueError('the message names no joints')
-        velocity = self._joints.decode_velocity(message)
-        self._postures.add(to_ns(message.header.stamp), position, velocity)
-        self._see_ready()
-
-    def _on_image(self, message: Image | CompressedImage) -> None:
-        self._images.add(to_ns(message.header.stamp), message, time.monotonic())
-        self._see_ready()
-
-    def _see_ready(self) -> None:
-        calibrated = self._calibration is not None
-        for message, stamp_ns, posture in self._images.ready(calibrated, time.monotonic()):
-            if posture is None:
-                self.problem(
-                    'posture',
-                    'no joint state for the stamp of the image: the camera is taken to stand '
-                    'still, and no face counts as attended',
-                    Level.WARN,
-                )
-            self._see(message, stamp_ns, posture)
-
-    def _see(
-        self, message: Image | CompressedImage, stamp_ns: int, posture: Posture | None
-    ) -> None:
+    def _detect(self, found: StampedSet) -> None:
+        message, stamp_ns, posture = (
+            found[self._image_topic],
+            found.stamp_ns,
+            found.posture_or_none,
+        )
+        if posture is None:
+            self.problem(
+                'posture',
+                'no joint state for the stamp of the image: the camera is taken to stand '
+                'still, and no face counts as attended',
+                Level.WARN,
+            )
         start = time.perf_counter()
         compressed = isinstance(message, CompressedImage)
         image = decode_compressed(message) if compressed else decode_image(message)
         camera = self._camera(image)
         if self._seen is None or self._seen[0] != stamp_ns:
-            self._seen = stamp_ns, self._detector.look(image, stamp_ns, camera, posture)
+            self._seen = stamp_ns, self._detector.detect(image, stamp_ns, camera, posture)
         # The same image again (a sim that lost the answer): the same answer again.
         percept = self._seen[1]
         self._tell(message.header, percept)
@@ -189,22 +171,17 @@ class SalientFeatureDetectorNode(GraphNode):
     def _camera(self, image: NDArray[np.uint8]) -> CameraModel:
         """The calibrated camera for images of this size, or an ideal one."""
         height, width = image.shape[:2]
-        camera = None
-        if self._calibration is not None:
-            info = self._calibration
-            camera = CameraModel.from_calibration(
-                info.width or width, info.height or height, info.k, info.d
-            )
-        if camera is None:
-            field_of_view_rad = self._input.field_of_view_rad
-            self.problem(
-                'calibration',
-                'the camera is not calibrated: a horizontal view of '
-                f'{math.degrees(field_of_view_rad):.0f} degrees is assumed (field_of_view_rad)',
-                Level.WARN,
-            )
-            return CameraModel.from_field_of_view(width, height, field_of_view_rad)
-        return camera.resized(width, height)
+        camera = decode_camera_info(self._calibration, width, height)
+        if camera is not None:
+            return camera
+        field_of_view_rad = self._input.field_of_view_rad
+        self.problem(
+            'calibration',
+            'the camera is not calibrated: a horizontal view of '
+            f'{math.degrees(field_of_view_rad):.0f} degrees is assumed (field_of_view_rad)',
+            Level.WARN,
+        )
+        return CameraModel.from_field_of_view(width, height, field_of_view_rad)
 
 
 def _point(header: Header, detection: Detection) -> PointStamped:

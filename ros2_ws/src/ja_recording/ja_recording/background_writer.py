@@ -1,4 +1,4 @@
-"""Writes a recording in a thread of its own, so that a slow disk never holds a subscriber up."""
+"""Write a recording in a separate thread, so that a slow disk never delays a subscriber."""
 
 import queue
 import threading
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 from ja_recording.recording_folder import Channel, RecordingFolder
 
-FLUSH_EVERY_S = 0.5
+FLUSH_PERIOD_S = 0.5
 
 
 @dataclass(frozen=True)
-class Sample:
-    """One message on its way to the disk."""
+class QueuedMessage:
+    """One message that waits for the disk."""
 
     channel: Channel
     data: bytes
@@ -22,15 +22,16 @@ class Sample:
 
 
 class BackgroundWriter:
-    """A bounded queue before a `RecordingFolder`; what does not fit is counted, not waited for.
+    """A bounded queue in front of a `RecordingFolder`; messages that do not fit are dropped.
 
-    `failure`: why writing has ended before its time, in one sentence; None while all is well.
+    `written`, `dropped`: counts of messages. `failure`: why writing ended too early, in one
+    sentence; None while there is no error.
     """
 
     def __init__(self, folder: RecordingFolder, queue_bytes: int) -> None:
         self._folder = folder
         self._limit = queue_bytes
-        self._queue: queue.SimpleQueue[Sample | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[QueuedMessage | None] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._waiting_bytes = 0
         self.written = 0
@@ -39,18 +40,18 @@ class BackgroundWriter:
         self._thread = threading.Thread(target=self._run, name='recorder', daemon=True)
         self._thread.start()
 
-    def put(self, sample: Sample) -> None:
-        """Leave a message for writing; returns at once."""
-        size = len(sample.data)
+    def queue_message(self, message: QueuedMessage) -> None:
+        """Queue a message for writing, or count it as dropped; return at once."""
+        size = len(message.data)
         with self._lock:
             if self.failure or self._waiting_bytes + size > self._limit:
                 self.dropped += 1
                 return
             self._waiting_bytes += size
-        self._queue.put(sample)
+        self._queue.put(message)
 
     def close(self) -> None:
-        """Write what waits, and end the recording."""
+        """Write the queued messages, and close the recording."""
         self._queue.put(None)
         self._thread.join()
 
@@ -63,27 +64,27 @@ class BackgroundWriter:
             try:
                 self._folder.close()
             except OSError as error:
-                self.failure = self.failure or f'the recording was not ended well: {error}'
+                self.failure = self.failure or f'the recording was not closed correctly: {error}'
 
     def _write_all(self) -> None:
-        due_s = time.monotonic() + FLUSH_EVERY_S
+        due_s = time.monotonic() + FLUSH_PERIOD_S
         while True:
             try:
-                sample = self._queue.get(timeout=max(0.0, due_s - time.monotonic()))
+                message = self._queue.get(timeout=max(0.0, due_s - time.monotonic()))
             except queue.Empty:
                 pass
             else:
-                if sample is None:
+                if message is None:
                     return
-                self._write(sample)
+                self._write(message)
             if time.monotonic() >= due_s:
                 self._folder.flush()
-                due_s = time.monotonic() + FLUSH_EVERY_S
+                due_s = time.monotonic() + FLUSH_PERIOD_S
 
-    def _write(self, sample: Sample) -> None:
-        self._folder.write(
-            sample.channel, sample.data, sample.stamp_ns, sample.sent_ns, sample.sequence
+    def _write(self, message: QueuedMessage) -> None:
+        self._folder.write_message(
+            message.channel, message.data, message.stamp_ns, message.sent_ns, message.sequence
         )
         with self._lock:
-            self._waiting_bytes -= len(sample.data)
+            self._waiting_bytes -= len(message.data)
         self.written += 1

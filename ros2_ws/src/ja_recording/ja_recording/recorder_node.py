@@ -1,4 +1,4 @@
-"""`recorder`: every topic of the graph, whatever its type, into a folder of MCAP files."""
+"""`recorder`: writes every topic of the graph, of any type, to a folder of MCAP files."""
 
 import re
 import time
@@ -11,24 +11,24 @@ from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
-from ja_common.core.config import ConfigError, parameter
+from ja_common.core.config import ConfigError, Configuration, parameter
 from ja_common.core.health import Level
 from ja_common.graph_node import GraphNode, spin_node
 from ja_common.message_types import message_class, schema_of
 from ja_common.qos_text import common_profile, offered_text
-from ja_recording.background_writer import BackgroundWriter, Sample
+from ja_recording.background_writer import BackgroundWriter, QueuedMessage
 from ja_recording.recording_folder import Channel, Limits, RecordingFolder
 
-_LOOK_EVERY_S = 0.2
-_DEPTH = 200
+_POLL_PERIOD_S = 0.2
+_QUEUE_DEPTH = 200
 
 
 @dataclass(frozen=True)
-class RecorderConfig:
-    """What is recorded, where, and how much of it is kept."""
+class RecorderConfig(Configuration):
+    """The topics to record, the folder, and how much of the recording to keep."""
 
     folder: str = parameter('', 'folder of the recording; empty: runs/<time>-record')
-    # Somebody who listens to the annotated image makes the detector draw it.
+    # A subscriber to the annotated image makes the detector draw it.
     exclude: str = parameter(
         'image_annotated', 'regular expression: topics that it matches anywhere are left out'
     )
@@ -42,7 +42,7 @@ class RecorderConfig:
 
 
 class RecorderNode(GraphNode):
-    """Hears raw bytes and passes them on to a writing thread; decodes nothing."""
+    """Subscribes to raw bytes and passes them to a writing thread; decodes nothing."""
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('recorder', **node_kwargs)
@@ -59,29 +59,31 @@ class RecorderNode(GraphNode):
         )
         self._began_ns = time.time_ns()
         self._known: set[str] = set()
-        self.create_timer(_LOOK_EVERY_S, self._look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.create_timer(
+            _POLL_PERIOD_S, self._poll_graph, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
         self.get_logger().info(f'recording into {self.folder}')
 
     @property
     def elapsed_s(self) -> float:
-        """Seconds since the recording began."""
+        """Return the time since the recording began [s]."""
         return 1e-9 * (time.time_ns() - self._began_ns)
 
     @property
     def topics(self) -> int:
-        """How many topics are recorded."""
+        """Return the number of recorded topics."""
         return len(self._known)
 
     def destroy_node(self) -> None:
-        """End the recording, then the node."""
+        """Close the recording, then destroy the node."""
         self.writer.close()
         super().destroy_node()
 
-    def _look(self) -> None:
-        """Hear what is new in the graph; tell how the writing goes."""
+    def _poll_graph(self) -> None:
+        """Subscribe to the new topics of the graph; update the health of the writer."""
         for name, types in self.get_topic_names_and_types():
-            if name not in self._known and not self._left_out(name):
-                self._hear_raw(name, types)
+            if name not in self._known and not self._is_excluded(name):
+                self._subscribe_raw(name, types)
         self.health.values |= {
             'folder': str(self.folder),
             'topics': str(len(self._known)),
@@ -94,14 +96,14 @@ class RecorderNode(GraphNode):
             text = f'the disk is too slow: {self.writer.dropped} messages were dropped'
             self.problem('writing', text, Level.WARN)
 
-    def _left_out(self, name: str) -> bool:
+    def _is_excluded(self, name: str) -> bool:
         hidden = any(part.startswith('_') for part in name.split('/'))
         return hidden or bool(self._exclude and self._exclude.search(name))
 
-    def _hear_raw(self, name: str, types: list[str]) -> None:
+    def _subscribe_raw(self, name: str, types: list[str]) -> None:
         publishers = self.get_publishers_info_by_topic(name)
         if not publishers:
-            return  # only heard: nobody knows yet how it will be said
+            return  # no publisher yet: its quality of service is not known
         self._known.add(name)
         try:
             if len(types) > 1:
@@ -115,32 +117,36 @@ class RecorderNode(GraphNode):
         channel = Channel(
             name, types[0], offered_text(offered), str(publishers[0].topic_type_hash)
         )
-        # As strict as all the publishers allow, and no stricter: then none is left out.
+        # As strict as all the publishers allow, and no stricter: then every one of them matches.
         profile = common_profile(
             reliable=all(p.reliability is ReliabilityPolicy.RELIABLE for p in offered),
             latched=all(p.durability is DurabilityPolicy.TRANSIENT_LOCAL for p in offered),
-            depth=_DEPTH,
+            depth=_QUEUE_DEPTH,
         )
         self.create_subscription(
             kind,
             name,
-            self._keeper(channel),
+            self._writer_callback(channel),
             profile,
             raw=True,
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
 
-    def _keeper(self, channel: Channel) -> Callable[[bytes, Any], None]:
-        put = self.writer.put
+    def _writer_callback(self, channel: Channel) -> Callable[[bytes, Any], None]:
+        queue_message = self.writer.queue_message
 
-        def keep(data: bytes, info: Any) -> None:
-            # In the order in which things were said, however late we hear of them. A latched
-            # message is older than the recording: it comes first.
+        def on_message(data: bytes, info: Any) -> None:
+            # Ordered by the time of publication, not of arrival. A latched message is older than
+            # the recording: it comes first.
             sent_ns = info['source_timestamp'] or time.time_ns()
             stamp_ns = max(sent_ns, self._began_ns)
-            put(Sample(channel, data, stamp_ns, sent_ns, info['publication_sequence_number'] or 0))
+            queue_message(
+                QueuedMessage(
+                    channel, data, stamp_ns, sent_ns, info['publication_sequence_number'] or 0
+                )
+            )
 
-        return keep
+        return on_message
 
 
 def main(args: list[str] | None = None) -> None:

@@ -1,4 +1,4 @@
-"""A folder of MCAP files that a recorder fills: flushed, split, and bounded in size and age."""
+"""Write a folder of MCAP files that is flushed, split, and bounded in size and age."""
 
 import time
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ _CHUNK_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Channel:
-    """What a recording says of a topic; `offered_qos` is rosbag2's YAML."""
+    """What a recording keeps of a topic; `offered_qos` is rosbag2's YAML."""
 
     topic: str
     type_name: str
@@ -27,7 +27,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Limits:
-    """When a new file begins, and when the oldest ones go; 0: never."""
+    """When to begin a new file, and when to delete the oldest ones; 0: never."""
 
     split_mb: float = 256.0
     split_s: float = 600.0
@@ -36,8 +36,8 @@ class Limits:
 
 
 @dataclass
-class _File:
-    """One file of the folder: what metadata.yaml says of it."""
+class _OpenFile:
+    """One file of the folder, with what metadata.yaml needs to know of it."""
 
     path: Path
     began_s: float
@@ -45,12 +45,12 @@ class _File:
     last_ns: int = 0
     counts: dict[str, int] = field(default_factory=dict)
 
-    def add(self, topic: str, stamp_ns: int) -> None:
+    def count_message(self, topic: str, stamp_ns: int) -> None:
         self.first_ns = min(self.first_ns, stamp_ns)
         self.last_ns = max(self.last_ns, stamp_ns)
         self.counts[topic] = self.counts.get(topic, 0) + 1
 
-    def entry(self) -> dict[str, Any]:
+    def metadata_entry(self) -> dict[str, Any]:
         count = sum(self.counts.values())
         return {
             'path': self.path.name,
@@ -61,58 +61,58 @@ class _File:
 
 
 class RecordingFolder:
-    """Writes messages as they come; not for several threads at once.
+    """Writes messages in the order of its calls; not thread-safe.
 
-    What `flush` has written survives the death of this process. `close` adds the indexes, and the
-    metadata.yaml of rosbag2; without it the files are read as far as they go. Raises OSError when
-    the disk cannot take more.
+    What `flush` has written survives a crash of this process. `close` adds the indexes, and the
+    metadata.yaml of rosbag2; a file without them can be read up to its last whole message.
+    Raises OSError when the disk is full or fails.
     """
 
     def __init__(self, folder: Path, limits: Limits) -> None:
         self._folder = folder
         self._limits = limits
-        self._files: list[_File] = []
+        self._files: list[_OpenFile] = []
         self._channels: dict[str, Channel] = {}
         self._number = 0
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.glob('*.mcap')):
             raise ConfigError(f'{folder} holds a recording already: name another folder')
-        self._begin()
+        self._open_file()
 
-    def write(
+    def write_message(
         self, channel: Channel, data: bytes, stamp_ns: int, sent_ns: int, sequence: int
     ) -> None:
-        """Add one message, as it was on the wire (CDR). Times in nanoseconds of the wall clock."""
+        """Write one message, as it was on the wire (CDR). Times: wall clock [ns]."""
         self._channels[channel.topic] = channel
         if channel.topic not in self._ids:
-            self._ids[channel.topic] = self._register(channel)
+            self._ids[channel.topic] = self._register_channel(channel)
         self._writer.add_message(
             self._ids[channel.topic], stamp_ns, data, sent_ns, sequence % 2**32
         )
-        self._files[-1].add(channel.topic, stamp_ns)
+        self._files[-1].count_message(channel.topic, stamp_ns)
 
     def flush(self) -> None:
-        """Hand everything to the system; begin a new file, and drop old ones, when it is time."""
+        """Flush to the operating system; split the recording and delete old files when due."""
         self._writer.flush()
         file = self._files[-1]
         age_s = time.monotonic() - file.began_s
         full = 0 < self._limits.split_mb * _MB <= self._stream.tell()
         if file.counts and (full or 0 < self._limits.split_s <= age_s):
-            self._end()
-            self._begin()
-        self._drop_oldest()
+            self._finish_file()
+            self._open_file()
+        self._delete_oldest()
 
     def close(self) -> None:
-        """End the file and describe the folder."""
-        self._end()
+        """Finish the file and write metadata.yaml."""
+        self._finish_file()
         if self._channels:
             text = yaml.safe_dump(self._description(), sort_keys=False)
             (self._folder / 'metadata.yaml').write_text(text, encoding='utf-8')
 
-    def _begin(self) -> None:
+    def _open_file(self) -> None:
         path = self._folder / f'{self._folder.name}_{self._number}.mcap'
         self._number += 1
-        self._files.append(_File(path, time.monotonic()))
+        self._files.append(_OpenFile(path, time.monotonic()))
         self._stream: IO[bytes] = path.open('wb')
         self._writer = Writer(
             self._stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD
@@ -121,13 +121,13 @@ class RecordingFolder:
         self._schemas: dict[str, int] = {}
         self._ids: dict[str, int] = {}
 
-    def _end(self) -> None:
+    def _finish_file(self) -> None:
         try:
             self._writer.finish()
         finally:
             self._stream.close()
 
-    def _register(self, channel: Channel) -> int:
+    def _register_channel(self, channel: Channel) -> int:
         if channel.type_name not in self._schemas:
             text = schema_of(channel.type_name).encode()
             self._schemas[channel.type_name] = self._writer.register_schema(
@@ -140,12 +140,12 @@ class RecordingFolder:
             {'offered_qos_profiles': channel.offered_qos, 'topic_type_hash': channel.type_hash},
         )
 
-    def _drop_oldest(self) -> None:
-        """Never the one that is being written."""
-        while len(self._files) > 1 and self._too_much():
+    def _delete_oldest(self) -> None:
+        """Delete files beyond the limits, but never the one that is being written."""
+        while len(self._files) > 1 and self._exceeds_limits():
             self._files.pop(0).path.unlink(missing_ok=True)
 
-    def _too_much(self) -> bool:
+    def _exceeds_limits(self) -> bool:
         size = sum(file.path.stat().st_size for file in self._files if file.path.exists())
         # A file is as old as the message that ended it.
         age_s = time.monotonic() - self._files[1].began_s
@@ -183,7 +183,7 @@ class RecordingFolder:
                 'compression_format': '',
                 'compression_mode': '',
                 'relative_file_paths': [file.path.name for file in files],
-                'files': [file.entry() for file in files],
+                'files': [file.metadata_entry() for file in files],
                 'custom_data': None,
                 'ros_distro': 'jazzy',
             }

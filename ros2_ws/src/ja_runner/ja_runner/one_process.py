@@ -1,4 +1,4 @@
-"""All nodes in one process, on one executor: quicker messages, one log, one fate."""
+"""All nodes in one process, on one executor: faster messages, one log, one exit."""
 
 import signal
 from collections.abc import Callable, Sequence
@@ -9,7 +9,7 @@ from rclpy.node import Node
 
 from ja_common.core.config import ConfigError
 from ja_common.executor import CachedWaitSetExecutor
-from ja_runner.graph import NodeSpec
+from ja_runner.node_spec import NodeSpec
 
 
 def run_in_one_process(
@@ -18,14 +18,14 @@ def run_in_one_process(
     done: Callable[[], bool],
     report: Callable[[str], None] = print,
 ) -> int:
-    """Compose the graph and an observing node; spin until `done()`, SIGINT or SIGTERM.
+    """Run the graph and an observing node until `done()`, SIGINT or SIGTERM.
 
-    Returns the exit code: 0, or 1 when a node cannot be made (one sentence is reported).
+    Returns the exit code: 0, or 1 when a node cannot be made (`report` gets one sentence).
     """
     context = Context()
     rclpy.init(args=[], context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
     executor = CachedWaitSetExecutor(context=context)
-    stop = _Stop()
+    stop = _StopSignal()
     nodes: list[Node] = []
     try:
         for spec in graph:
@@ -36,7 +36,7 @@ def run_in_one_process(
         nodes.append(make_observer(context))
         for node in nodes:
             executor.add_node(node)
-        while not (stop.asked or done()):
+        while not (stop.received or done()):
             executor.spin_once(timeout_sec=0.1)
     except (ConfigError, OSError) as error:
         report(f'error: {error}')
@@ -50,17 +50,18 @@ def run_in_one_process(
     return 0
 
 
-class _Stop:
-    """SIGINT and SIGTERM as a flag: nothing is torn down in the middle of a callback."""
+class _StopSignal:
+    """SIGINT and SIGTERM as a flag, so that no callback is interrupted."""
 
     def __init__(self) -> None:
-        self.asked = False
+        self.received = False
         self._before = {
-            number: signal.signal(number, self._ask) for number in (signal.SIGINT, signal.SIGTERM)
+            number: signal.signal(number, self._on_signal)
+            for number in (signal.SIGINT, signal.SIGTERM)
         }
 
-    def _ask(self, *_: object) -> None:
-        self.asked = True
+    def _on_signal(self, *_: object) -> None:
+        self.received = True
 
     def restore(self) -> None:
         for number, handler in self._before.items():

@@ -1,4 +1,4 @@
-"""What people see while the graph runs: it listens like any other node, and changes nothing."""
+"""The progress display: a node that subscribes to the graph, and a table on the terminal."""
 
 import math
 import time
@@ -22,13 +22,13 @@ _LINE_EVERY_S = 5.0
 
 
 class ProgressNode(GraphNode):
-    """Collects the success curve, the state of the gate, the rate of images, and complaints."""
+    """A node that collects the success curve, the gate's state, the image rate, and warnings."""
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('progress', **node_kwargs)
         self.curve = LearningCurve()
         self.gate: Mapping[str, str] = {}
-        self.complaints: dict[str, str] = {}
+        self.warnings: dict[str, str] = {}
         self.images = 0
         self.objects = 1
         self.began_s = math.nan
@@ -39,12 +39,12 @@ class ProgressNode(GraphNode):
 
     @property
     def elapsed_s(self) -> float:
-        """Wall time since the first image went all the way round; 0 before."""
+        """Return the wall time [s] since the gate answered the first image; 0 before."""
         return 0.0 if math.isnan(self.began_s) else time.monotonic() - self.began_s
 
     @property
     def images_per_s(self) -> float:
-        """Recent rate of images that went all the way round (the gate answers every one)."""
+        """Return the recent rate of images [1/s] that the gate has answered."""
         times = self._image_times_s
         if len(times) < 2 or time.monotonic() - times[-1] > 2.0:
             return 0.0
@@ -67,12 +67,12 @@ class ProgressNode(GraphNode):
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.level == DiagnosticStatus.OK:
-                self.complaints.pop(status.name, None)
+                self.warnings.pop(status.name, None)
             else:
-                self.complaints[status.name] = status.message
+                self.warnings[status.name] = status.message
 
     def facts(self) -> dict[str, str]:
-        """What to show, in this order."""
+        """Return what the display shows, in this order."""
         facts = {
             'trials': str(len(self.curve.records) or self.gate.get('trials', '0')),
             'stage': self.curve.stage or '-',
@@ -83,11 +83,11 @@ class ProgressNode(GraphNode):
             'images/s': f'{self.images_per_s:.0f}',
             'time': f'{self.elapsed_s:.0f} s',
         }
-        return facts | dict(sorted(self.complaints.items()))
+        return facts | dict(sorted(self.warnings.items()))
 
 
 class Display:
-    """A live table on a terminal; a plain line now and then elsewhere."""
+    """A live table on a terminal; elsewhere a plain line every few seconds."""
 
     def __init__(self, title: str, console: Console | None = None) -> None:
         self._title = title
@@ -105,19 +105,19 @@ class Display:
         if self._live is not None:
             self._live.stop()
 
-    def say(self, text: str) -> None:
-        """A line that stays."""
+    def print_line(self, text: str) -> None:
+        """Print a line that stays above the live table."""
         self._console.print(text, markup=False, highlight=False, soft_wrap=True)
 
-    def show(self, node: ProgressNode) -> None:
-        """The state of the run, when it is time to look again."""
+    def update(self, node: ProgressNode) -> None:
+        """Show the state of the run, if the last update is old enough."""
         now = time.monotonic()
         if now < self._next_s:
             return
         facts = node.facts()
         if self._live is None:
             self._next_s = now + _LINE_EVERY_S
-            self.say('  '.join(f'{name}: {text}' for name, text in facts.items()))
+            self.print_line('  '.join(f'{name}: {text}' for name, text in facts.items()))
             return
         self._next_s = now + _SCREEN_EVERY_S
         table = Table(title=self._title, show_header=False, title_justify='left')

@@ -1,4 +1,4 @@
-"""Run a graph in either composition, with its progress on the terminal."""
+"""Run a graph in one process or in many, with its progress on the terminal."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -14,12 +14,12 @@ from ja_common.private_executor import own_executor
 from ja_common.ros_arguments import check_ros_arguments
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_runner.companion import Companion
-from ja_runner.graph import NodeSpec
+from ja_runner.node_spec import NodeSpec
 from ja_runner.one_process import run_in_one_process
 from ja_runner.progress import Display, ProgressNode
 from ja_runner.supervisor import OnDeath, Supervisor
 
-# The learner and the gate are kept side by side, so that they are of the same age when they go on.
+# Learner and gate save into the same folder, so that both resume from the same trial.
 _MEMORY = {
     'learning_module': {'checkpoint_folder': 'checkpoints'},
     'gate': {'trials_file': 'trials'},
@@ -27,7 +27,7 @@ _MEMORY = {
 
 
 def new_run_folder(name: str, parent: Path = Path('runs')) -> Path:
-    """`runs/<time>-<name>`, made."""
+    """Make the folder `runs/<time>-<name>` and return its path."""
     folder = parent / f'{time.strftime("%Y%m%d-%H%M%S")}-{name}'
     folder.mkdir(parents=True, exist_ok=True)
     return folder
@@ -45,68 +45,71 @@ def run_graph(
     arguments: Sequence[str] = (),
     memory: Path | None = None,
 ) -> tuple[int, ProgressNode]:
-    """Run until `done`, a signal, or a death; the exit code, and the node that has watched.
+    """Run until `done`, a signal, or a death; return the exit code and the progress node.
 
-    `arguments`: the ROS arguments that all nodes get (a namespace is the watcher's as well).
-    `memory`: where what is learned is kept, and taken up if it is there; by default the folder.
-    `view`: serve the live page beside the graph, in a process of its own.
+    `arguments`: the ROS arguments of all nodes (the progress node gets the namespace as well).
+    `memory`: the folder in which learner and gate save what they learned, and from which they
+    resume if it is there; by default `folder`.
+    `view`: serve the live page beside the graph, in its own process.
     """
     apply_ros_defaults()
     check_ros_arguments(arguments)
     graph = [_with_memory(spec, (memory or folder).absolute()) for spec in graph]
-    watcher: list[ProgressNode] = []
+    progress: list[ProgressNode] = []
 
-    def make_watcher(context: Context) -> ProgressNode:
+    def make_progress_node(context: Context) -> ProgressNode:
         cli = ['--ros-args', *arguments] if arguments else []
-        watcher.append(ProgressNode(context=context, cli_args=cli, use_global_arguments=False))
-        return watcher[0]
+        progress.append(ProgressNode(context=context, cli_args=cli, use_global_arguments=False))
+        return progress[0]
 
     with Display(title) as display, ExitStack() as beside:
         page: Companion | None = None
         if view:
             spec = NodeSpec('ja_dashboard', 'view', arguments=arguments)
-            page = Companion(spec, folder / 'log', display.say, LIVE_PAGE)
+            page = Companion(spec, folder / 'log', display.print_line, LIVE_PAGE)
             beside.enter_context(page)
 
         def is_done() -> bool:
-            display.show(watcher[0])
+            display.update(progress[0])
             if page is not None:
-                page.look()
-            return done(watcher[0])
+                page.report_events()
+            return done(progress[0])
 
         if one_process:
-            code = run_in_one_process(graph, make_watcher, is_done, display.say)
+            code = run_in_one_process(graph, make_progress_node, is_done, display.print_line)
         else:
-            code = _run_processes(graph, folder, make_watcher, is_done, on_death, display.say)
-    return code, watcher[0]
+            code = _run_processes(
+                graph, folder, make_progress_node, is_done, on_death, display.print_line
+            )
+    return code, progress[0]
 
 
 def check_memory(folder: Path) -> None:
-    """Raises ConfigError when a run has left nothing that another could go on from."""
+    """Raise ConfigError when the run in this folder left no checkpoint to resume from."""
     checkpoints = folder / _MEMORY['learning_module']['checkpoint_folder']
     if not list(checkpoints.glob('*.npz')):
         raise ConfigError(f'{folder} cannot be resumed: there is no checkpoint in {checkpoints}')
 
 
 def _with_memory(spec: NodeSpec, folder: Path) -> NodeSpec:
-    """What the node learns outlives it in the folder, if nobody named another place."""
-    ours = {name: str(folder / place) for name, place in _MEMORY.get(spec.thing, {}).items()}
+    """Return the node with parameters that save what it learns, unless they are set already."""
+    ours = {name: str(folder / place) for name, place in _MEMORY.get(spec.executable, {}).items()}
     return replace(spec, parameters={**ours, **spec.parameters})
 
 
 def _run_processes(
     graph: Sequence[NodeSpec],
     folder: Path,
-    make_watcher: Callable[[Context], ProgressNode],
+    make_progress_node: Callable[[Context], ProgressNode],
     is_done: Callable[[], bool],
     on_death: OnDeath,
-    say: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> int:
     with own_executor() as executor:
-        executor.add_node(make_watcher(executor.context))
+        executor.add_node(make_progress_node(executor.context))
 
         def tick() -> bool:
             executor.spin_once(timeout_sec=0.1)
             return is_done()
 
-        return Supervisor(graph, folder / 'log', on_death, say).run(tick)
+        return Supervisor(graph, folder / 'log', on_death, report).run(tick)

@@ -7,7 +7,7 @@ from typing import Any
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Header
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.graph_node import GraphNode, spin_node
 from ja_common.image_codec import decode_image, encode_camera_info, encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
@@ -17,7 +17,7 @@ from ja_sim.core.digital_head import DigitalHead, DigitalHeadConfig
 
 
 @dataclass(frozen=True)
-class FrameConfig:
+class FrameConfig(Configuration):
     """Names on the wire."""
 
     frame_id: str = parameter('camera_optical_frame', 'optical frame of the window')
@@ -44,7 +44,7 @@ class DigitalHeadNode(GraphNode):
             self._head.command(posture)
 
     def _on_wide_image(self, message: Image) -> None:
-        view, posture = self._head.look(decode_image(message), to_ns(message.header.stamp))
+        view, posture = self._head.render_view(decode_image(message), to_ns(message.header.stamp))
         header = Header(stamp=message.header.stamp, frame_id=self._frame_id)
         self._says_joints.publish(
             self._joints.encode_posture(header, posture.position, posture.velocity)

@@ -21,7 +21,7 @@ import numpy as np
 from ja_common.core.fixation import WIDTH_SIXTH, nearest_to_centre
 from ja_common.core.geometry import rays_of_directions
 from ja_sim.core.scene import load_scene
-from ja_sim.core.world import JointAttentionWorld, Truth
+from ja_sim.core.world import JointAttentionWorld, WorldTruth
 
 ENV_ID = 'JointAttention-v0'
 SHIFT_S = 0.1
@@ -106,11 +106,11 @@ class JointAttentionEnv(gymnasium.Env):
             'posture': np.clip(posture, box.low, box.high),
         }
 
-    def _info(self, truth: Truth) -> dict[str, Any]:
+    def _info(self, truth: WorldTruth) -> dict[str, Any]:
         seen = self._world.observe()
         return {'trial': truth.trial, 'camera': (seen.fx, seen.fy, seen.cx, seen.cy)}
 
-    def _fixated(self, truth: Truth) -> int | None:
+    def _fixated(self, truth: WorldTruth) -> int | None:
         rays = rays_of_directions(truth.posture, truth.directions)
         return nearest_to_centre(rays, self._d_th_rad)
 

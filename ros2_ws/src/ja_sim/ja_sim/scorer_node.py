@@ -6,17 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float32
 from std_srvs.srv import Trigger
 
-from ja_common.core.config import parameter
-from ja_common.core.stamp_join import StampJoin
+from ja_common.core.config import Configuration, parameter
 from ja_common.graph_node import GraphNode, spin_node
 from ja_common.joint_codec import JointCodec, JointConfig
-from ja_common.time_codec import to_ns
+from ja_common.synchroniser import StampedSet, Synchroniser
 from ja_common.topics import FIXATION, SCORE, SIM_TRUTH, SUCCESS_RATE
-from ja_sim.core.score import Outcome, Score
+from ja_sim.core.score import Score, TrialOutcome
 from ja_sim.truth_codec import decode_truth
 
 _CSV_COLUMNS = (
@@ -26,7 +24,7 @@ _CSV_COLUMNS = (
 
 
 @dataclass(frozen=True)
-class ScorerConfig:
+class ScorerConfig(Configuration):
     """What is reported, and where it is kept."""
 
     window_trials: int = parameter(100, 'trials of the recent success rate', low=1, high=100000)
@@ -41,9 +39,9 @@ class ScorerNode(GraphNode):
         self._config = self.configure(ScorerConfig)
         self._joints = JointCodec(self.configure(JointConfig))
         self._score = Score(self._config.window_trials)
-        self._join = StampJoin([SIM_TRUTH.name, FIXATION.name])
-        self.subscribe(SIM_TRUTH, self._on_truth, expected_every_s=2.0)
-        self.subscribe(FIXATION, self._on_fixation, expected_every_s=2.0)
+        Synchroniser(self).call_with(
+            {SIM_TRUTH: decode_truth, FIXATION: self._joints.decode}, self._score_image
+        )
         self._success_rate = self.create_topic_publisher(SUCCESS_RATE)
         self._details = self.create_topic_publisher(SCORE)
         self.advertise_service(Trigger, 'sim/reset_score', self._on_reset)
@@ -65,21 +63,12 @@ class ScorerNode(GraphNode):
         self._csv.writerow(_CSV_COLUMNS)
         return file
 
-    def _on_truth(self, message: PointCloud2) -> None:
-        self._collect(SIM_TRUTH.name, to_ns(message.header.stamp), decode_truth(message))
-
-    def _on_fixation(self, message: JointState) -> None:
-        self._collect(FIXATION.name, to_ns(message.header.stamp), self._joints.decode(message))
-
-    def _collect(self, key: str, stamp_ns: int, value: Any) -> None:
-        both = self._join.add(key, stamp_ns, value)
-        if both is None:
-            return
-        outcome = self._score.see(both[SIM_TRUTH.name], both[FIXATION.name])
+    def _score_image(self, found: StampedSet) -> None:
+        outcome = self._score.see(found[SIM_TRUTH], found[FIXATION])
         if outcome is not None:
             self._tell(outcome)
 
-    def _tell(self, outcome: Outcome) -> None:
+    def _tell(self, outcome: TrialOutcome) -> None:
         if self._csv_file is not None:
             self._csv.writerow(_csv_row(outcome))
         rates = self._score.rates()
@@ -109,7 +98,7 @@ class ScorerNode(GraphNode):
         return response
 
 
-def _csv_row(outcome: Outcome) -> list[Any]:
+def _csv_row(outcome: TrialOutcome) -> list[Any]:
     numbers = [outcome.trial, outcome.stamp_ns, outcome.objects]
     flags = [int(outcome.in_view), int(outcome.success)]
     fixated = outcome.fixated or ('', '')  # given up

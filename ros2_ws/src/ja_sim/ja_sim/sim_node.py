@@ -17,7 +17,7 @@ from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
-from ja_common.core.config import ConfigError, parameter
+from ja_common.core.config import ConfigError, Configuration, parameter
 from ja_common.core.health import Level
 from ja_common.core.stamps import NS_PER_S
 from ja_common.graph_node import GraphNode, spin_node
@@ -42,7 +42,7 @@ _T = TypeVar('_T')
 
 
 @dataclass(frozen=True)
-class SimConfig:
+class SimConfig(Configuration):
     """Which world, and by what its time passes."""
 
     scene: str = parameter('default', 'name of a scene, or path of a scene file (YAML)')
@@ -66,7 +66,7 @@ class SimConfig:
 
 
 @dataclass(frozen=True)
-class LiveConfig:
+class LiveConfig(Configuration):
     """What may change while the world runs."""
 
     objects: int = parameter(

@@ -13,12 +13,12 @@ from ja_common.time_codec import to_ns
 from ja_sim.core.score import TruthAt
 
 if TYPE_CHECKING:  # the scorer reads this module and needs no MuJoCo
-    from ja_sim.core.world import Truth
+    from ja_sim.core.world import WorldTruth
 
 FIELDS = ('x', 'y', 'z', 'pan', 'tilt', 'attended', 'in_view', 'trial')
 
 
-def encode_truth(header: Header, truth: Truth) -> PointCloud2:
+def encode_truth(header: Header, truth: WorldTruth) -> PointCloud2:
     """Position [m] and direction [rad] of every object, which is meant, and the trial's number."""
     count = len(truth.positions)
     columns = [*truth.positions.T, *truth.directions.T]

@@ -18,7 +18,8 @@ from ja_experiments.agents.trial_loop import TrialLoop
 from ja_experiments.config import ExperimentConfig
 from ja_experiments.datasets.looks import load_looks
 from ja_experiments.processes import side_by_side
-from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
+from ja_learning.core.gaze_line import GazeLineLearner
+from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_sim.core.scene import load_scene
 
 SEEDS = range(5)

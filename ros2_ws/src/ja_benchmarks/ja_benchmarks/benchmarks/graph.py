@@ -13,7 +13,8 @@ from ja_benchmarks.rows import Row, percentile_99, row
 from ja_common.core.config import ConfigError
 from ja_common.time_codec import to_ns
 from ja_common.topics import DETECTIONS, FIXATION, IMAGE, JOINT_COMMANDS, LM_DELTA, VF_DELTA
-from ja_runner.graph import NodeSpec, sim_graph, with_arguments
+from ja_runner.graph import sim_graph, with_arguments
+from ja_runner.node_spec import NodeSpec
 from ja_runner.progress import ProgressNode
 from ja_runner.run import run_graph
 
@@ -38,10 +39,10 @@ def lockstep_rates(graph: Sequence[NodeSpec], one_process: bool) -> dict[str, Ro
 
     Also the processor time of this process for an image: what the graph costs if it is all here.
     """
-    return _Watch(graph, one_process).rates()
+    return _RateMeter(graph, one_process).rates()
 
 
-class _Watch:
+class _RateMeter:
     """One lockstep run, and the times at which images and trials were finished."""
 
     def __init__(self, graph: Sequence[NodeSpec], one_process: bool) -> None:
@@ -81,7 +82,7 @@ class _Watch:
         }
 
 
-class _Stopwatch:
+class _DelayMeter:
     """When the messages of each image arrived at one and the same listener."""
 
     def __init__(self) -> None:
@@ -114,7 +115,7 @@ class _Stopwatch:
 
 
 def _latencies() -> dict[str, Row]:
-    stopwatch = _Stopwatch()
+    stopwatch = _DelayMeter()
     graph = with_arguments(sim_graph(), ['-p', 'lockstep:=false'])
     run_for_benchmark(graph, stopwatch.tick, one_process=False)
     return {f'{name}, 10 Hz, many processes': row for name, row in stopwatch.rows().items()}

@@ -37,7 +37,7 @@ from ja_common.ros_defaults import apply_ros_defaults
 from ja_common.status_values import status_values
 from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import DETECTIONS, DIAGNOSTICS, FACE_IMAGE, FIXATION, JOINT_STATES, LM_DELTA
-from ja_runner.graph import NodeSpec
+from ja_runner.node_spec import NodeSpec
 from ja_runner.supervisor import Supervisor
 
 RATE_HZ = 30.0
@@ -81,9 +81,9 @@ def run() -> dict[str, Row]:
     return rows
 
 
-def _measure(parameters: dict[str, Any]) -> '_Watch':
+def _measure(parameters: dict[str, Any]) -> '_LearnerProbe':
     with own_executor() as executor, TemporaryDirectory() as folder:
-        watch = _Watch(context=executor.context)
+        watch = _LearnerProbe(context=executor.context)
         executor.add_node(watch)
         story = watch.story()
 
@@ -98,7 +98,7 @@ def _measure(parameters: dict[str, Any]) -> '_Watch':
         return watch
 
 
-class _Watch(GraphNode):
+class _LearnerProbe(GraphNode):
     """Plays all that the learner hears, image after image, and times its answers."""
 
     def __init__(self, **node_kwargs: Any) -> None:

@@ -56,7 +56,7 @@ def run() -> dict[str, Row]:
         with ExitStack() as beside:
             folder = Path(beside.enter_context(TemporaryDirectory()))
             for spec in head:
-                beside.enter_context(Companion(spec, folder, print, news=''))
+                beside.enter_context(Companion(spec, folder, print, announcement=''))
             run_for_benchmark(mind, stopwatch.tick, one_process)
         rows |= {f'{figure}, {name}': found for figure, found in stopwatch.rows().items()}
     return rows

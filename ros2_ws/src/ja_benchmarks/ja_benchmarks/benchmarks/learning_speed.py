@@ -21,9 +21,12 @@ from ja_benchmarks.ceiling import ceiling
 from ja_benchmarks.rows import Row, success_row
 from ja_experiments.datasets.looks import POOL, Looks, load_looks
 from ja_experiments.processes import side_by_side
-from ja_learning.core.gaze_line import GazeLineConfig, GazeLineLearner
-from ja_learning.core.learner import LearnerChoice, Predictor, make_learner
-from ja_learning.core.network import NetworkConfig, ThreeLayerNetwork
+from ja_learning.core.gaze_line import GazeLineLearner
+from ja_learning.core.gaze_line_config import GazeLineConfig
+from ja_learning.core.learner import Predictor
+from ja_learning.core.learner_registry import LearnerChoice, make_learner
+from ja_learning.core.network import ThreeLayerNetwork
+from ja_learning.core.network_config import NetworkConfig
 from ja_learning.core.trial import Trial
 
 SEEDS = range(10)
@@ -39,7 +42,7 @@ _FROM_FACE_RAD, _APART_RAD = np.radians([8.0, 5.0])
 
 
 @dataclass(frozen=True)
-class Condition:
+class LearningTask:
     """What is asked. `pool`: learn from so many looks only, and be tested on them; 0: fresh ones.
 
     `marks`: after which trials. `change_at`: after so many trials she is another caregiver, or
@@ -57,17 +60,17 @@ class Condition:
 
 
 CONDITIONS = (
-    Condition('5 objects', 5, (25, 50, 100, 150, 400)),
-    Condition('10 objects', 10, (100, 200, 400, 600, 2000)),
-    Condition('5 objects, pool of 125', 5, (100, 200, 300), pool=POOL),
-    Condition('10 objects, pool of 125', 10, (200, 400, 700), pool=POOL),
-    Condition('5 objects, 30 % of looks elsewhere', 5, (100, 150, 200, 400), reliability=0.7),
-    Condition('5 objects, another caregiver after 400', 5, (400, 401, 425, 450), change_at=400),
-    Condition(
+    LearningTask('5 objects', 5, (25, 50, 100, 150, 400)),
+    LearningTask('10 objects', 10, (100, 200, 400, 600, 2000)),
+    LearningTask('5 objects, pool of 125', 5, (100, 200, 300), pool=POOL),
+    LearningTask('10 objects, pool of 125', 10, (200, 400, 700), pool=POOL),
+    LearningTask('5 objects, 30 % of looks elsewhere', 5, (100, 150, 200, 400), reliability=0.7),
+    LearningTask('5 objects, another caregiver after 400', 5, (400, 401, 425, 450), change_at=400),
+    LearningTask(
         '5 objects, another room after 400', 5, (400, 401, 425, 450),
         change_at=400, another_room='bare_room',
     ),
-    Condition('10 objects, told which', 10, (200, 600, 2000), told=True),
+    LearningTask('10 objects, told which', 10, (200, 600, 2000), told=True),
 )  # fmt: skip
 KINDS = (GazeLineLearner.kind, ThreeLayerNetwork.kind)
 
@@ -95,7 +98,7 @@ def run() -> dict[str, Row]:
     return rows | ceiling()
 
 
-def curve(kind: str, condition: Condition, seed: int) -> list[float]:
+def curve(kind: str, condition: LearningTask, seed: int) -> list[float]:
     """Success of one learner alone, 0-1, after each of the marks."""
     rng = np.random.default_rng([seed, condition.objects])
     looks = load_looks('default', seed, LOOKS)
@@ -111,7 +114,7 @@ def curve(kind: str, condition: Condition, seed: int) -> list[float]:
     return found
 
 
-def _looks_elsewhere(condition: Condition, seed: int) -> Looks | None:
+def _looks_elsewhere(condition: LearningTask, seed: int) -> Looks | None:
     """What is seen after the change: of another caregiver, or of the same in another room."""
     if not condition.change_at:
         return None
@@ -134,7 +137,7 @@ def success(learner: Predictor, looks: Looks, objects: int, seed: int) -> float:
     return float(np.mean(right))
 
 
-def _trial(rng: np.random.Generator, looks: Looks, trial: int, condition: Condition) -> Trial:
+def _trial(rng: np.random.Generator, looks: Looks, trial: int, condition: LearningTask) -> Trial:
     fresh = (trial - 1 - condition.change_at) % (len(looks) - TEST_LOOKS)
     look = int(rng.integers(condition.pool)) if condition.pool else fresh
     posture = looks.postures[look]

@@ -1,4 +1,4 @@
-"""What the ROS defaults are worth: discovery and 640x480 images at 60 Hz between two processes."""
+"""The effect of our ROS defaults: discovery, and 640x480 images at 60 Hz between two processes."""
 
 import json
 import os
@@ -16,7 +16,7 @@ REPEATS = 5
 
 
 def run() -> dict[str, Row]:
-    """With our defaults and with those of ROS (on this machine alone in both cases)."""
+    """Measure with our defaults and with those of ROS (both on this machine alone)."""
     bare = {name: value for name, value in os.environ.items() if name not in ENVIRONMENT}
     localhost = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
     rows: dict[str, Row] = {}
@@ -28,14 +28,14 @@ def run() -> dict[str, Row]:
 def _measure(environ: dict[str, str]) -> dict[str, Row]:
     discovery_s, share, delays_ms = [], [], []
     for _ in range(REPEATS):
-        hear = _start('hear', environ, stderr=subprocess.PIPE)
-        assert hear.stderr is not None
-        hear.stderr.readline()  # it listens now: what follows is discovery alone
-        say = _start('say', environ)
-        discovery_s.append(_result(say)['discovery_s'])
-        heard = _result(hear)['delays_ms']
-        share.append(len(heard) / _image_stream.IMAGES)
-        delays_ms += heard
+        receiver = _start(_image_stream.RECEIVE, environ, stderr=subprocess.PIPE)
+        assert receiver.stderr is not None
+        receiver.stderr.readline()  # it has subscribed: what follows is discovery alone
+        publisher = _start(_image_stream.PUBLISH, environ)
+        discovery_s.append(_result(publisher)['discovery_s'])
+        received = _result(receiver)['delays_ms']
+        share.append(len(received) / _image_stream.IMAGES)
+        delays_ms += received
     return {
         'discovery': row(discovery_s, 's'),
         'images delivered': row(share, 'share'),

@@ -59,7 +59,7 @@ def _plain_speed(name: str, materials: Materials) -> tuple[np.ndarray, np.ndarra
     """Trials/s of the readable experiment, and of its calls of PyTorch, once a repetition."""
     config = reading(name).with_settings({'objects': FEATURED_OBJECTS})
     experiment = ReferenceExperiment(config, materials.places, materials.pool, seed=0)
-    network, in_torch = experiment.network, _Stopwatch()
+    network, in_torch = experiment.network, _FunctionTimer()
     network.predict = in_torch.around(network.predict)  # type: ignore[method-assign]
     network.learn = in_torch.around(network.learn)  # type: ignore[method-assign]
     experiment.run(_WARM_UP_TRIALS)
@@ -83,7 +83,7 @@ def _figure_6(name: str, materials: Materials) -> tuple[float, float, int]:
     return seconds, used, len(configs) * len(plan.seeds) * plan.trials
 
 
-class _Stopwatch:
+class _FunctionTimer:
     """Adds up the time spent in functions."""
 
     def __init__(self) -> None:

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -35,10 +35,9 @@ from ja_common.detection_codec import encode_detections
 from ja_common.image_codec import decode_image, encode_image
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.detector import DetectorConfig, Percept, SalientFeatureDetector
+from ja_perception.core.face_finders import FACE_FINDERS
 from ja_perception.core.faces import FaceFinder
-from ja_perception.core.haar import HaarFaces
 from ja_perception.core.salient_objects import InterestConfig, SalientObjects
-from ja_perception.core.template_faces import TemplateFaces
 from ja_sim.core.digital_head import DigitalHead, DigitalHeadConfig
 
 Picture = NDArray[np.uint8]
@@ -48,11 +47,6 @@ FRAME_NS = 33_333_333
 FEATURES = {'colour': (1.0, 0.0, 0.0), 'texture': (0.0, 1.0, 0.0), 'all': (1.0, 1.0, 1.0)}
 FACE_WIDTHS_PX = (30, 40, 60, 100, 200)
 SPEEDS_DEG_S = (10, 20, 40, 80)
-FINDERS: dict[str, Callable[[], FaceFinder]] = {
-    'blazeface': BlazeFace,
-    'template': lambda: TemplateFaces(BlazeFace()),
-    'haar': HaarFaces,
-}
 
 
 def run() -> dict[str, Row]:
@@ -125,7 +119,7 @@ def cv2_saliency() -> dict[str, Row]:
 def faces() -> dict[str, Row]:
     """Faces found and invented by each finder; frames with the right number of faces."""
     rows = {}
-    for name, make in FINDERS.items():
+    for name, make in FACE_FINDERS.items():
         found: list[bool] = []
         invented = []
         for picture, marks in _pictures():
@@ -214,8 +208,8 @@ def attend(frames: Iterator[Picture], images: int = 60) -> dict[str, list[float]
     offsets: dict[str, list[float]] = {'face': [], 'object': []}
     for number in range(2 * images):
         what = 'face' if number < images else 'object'
-        view, posture = head.look(next(frames), (number + 1) * FRAME_NS)
-        percept = detector.look(view, posture.stamp_ns, camera, posture)
+        view, posture = head.render_view(next(frames), (number + 1) * FRAME_NS)
+        percept = detector.detect(view, posture.stamp_ns, camera, posture)
         seen = caregiver_face(percept.detections) if what == 'face' else percept.target
         if seen is not None:
             direction = directions_of_rays(posture.position, seen.ray)
@@ -233,7 +227,7 @@ class _NoFaces:
 
     smallest_share = 0.01
 
-    def find(self, image: Picture, square: Any) -> list[Any]:
+    def find_faces(self, image: Picture, square: Any) -> list[Any]:
         return []
 
 
@@ -278,14 +272,14 @@ def _camera(picture: Picture) -> CameraModel:
 
 
 def _first_look(picture: Picture, config: DetectorConfig) -> Percept:
-    return SalientFeatureDetector(BlazeFace(), config).look(picture, 1, _camera(picture), None)
+    return SalientFeatureDetector(BlazeFace(), config).detect(picture, 1, _camera(picture), None)
 
 
 def _settled(picture: Picture, finder: FaceFinder, looks: int = 30) -> Percept:
     """What is seen after a scan of the whole picture for faces."""
     detector, camera = SalientFeatureDetector(finder), _camera(picture)
     for number in range(looks):
-        percept = detector.look(picture, number * FRAME_NS, camera, None)
+        percept = detector.detect(picture, number * FRAME_NS, camera, None)
     return percept
 
 
@@ -317,7 +311,7 @@ def _clip_percepts(clip: str, detector: SalientFeatureDetector, most: int) -> It
     frames = _frames(clip)
     for number in range(min(most, count)):
         frame = cv2.resize(next(frames), (640, 480), interpolation=cv2.INTER_AREA)
-        yield detector.look(frame, (number + 1) * frame_ns, _camera(frame), None)
+        yield detector.detect(frame, (number + 1) * frame_ns, _camera(frame), None)
 
 
 def _on_any(seen: Detection | None, boxes: list[list[float]], picture: Picture) -> bool:
@@ -349,7 +343,7 @@ def _sweep(photo: Picture, speed_deg_s: float) -> Iterator[tuple[Picture, Postur
     head = DigitalHead(config)
     for number, pan_deg in enumerate(np.arange(-12, 12, speed_deg_s / 30)):
         head.command(np.radians([pan_deg, 0.3 * pan_deg]))
-        view, posture = head.look(photo, (number + 1) * FRAME_NS)
+        view, posture = head.render_view(photo, (number + 1) * FRAME_NS)
         velocity = np.radians([speed_deg_s, 0.3 * speed_deg_s])
         yield view, Posture(posture.stamp_ns, posture.position, velocity)
 
@@ -362,7 +356,7 @@ def _false_motion(photo: Picture, speed_deg_s: float) -> list[float]:
     camera = CameraModel.from_field_of_view(320, 240, VIEW_RAD)
     shares = []
     for view, posture in _sweep(photo, speed_deg_s):
-        percept = detector.look(view, posture.stamp_ns, camera, posture)
+        percept = detector.detect(view, posture.stamp_ns, camera, posture)
         if percept.motion_judged:
             shares.append(percept.moving_share)
     return shares
@@ -380,7 +374,7 @@ def _mover_hits(photo: Picture, speed_deg_s: float) -> tuple[list[bool], list[bo
         view = view.copy()
         cv2.circle(view, (round(u), round(v)), 14, (250, 250, 250), cv2.FILLED)
         cv2.circle(view, (round(u), round(v)), 7, (20, 20, 20), cv2.FILLED)
-        percept = detector.look(view, posture.stamp_ns, camera, posture)
+        percept = detector.detect(view, posture.stamp_ns, camera, posture)
         if percept.motion_judged:
             place = directions_of_rays((0, 0), camera.rays((u, v)))
             off = [
@@ -410,7 +404,7 @@ def _finds(objects: SalientObjects, views: list[tuple[Picture, Posture]]) -> NDA
     camera, seconds = _camera(views[0][0]), []
     for view, posture in views:
         start = time.thread_time()
-        objects.find(view, posture.stamp_ns, camera, posture, heads=[])
+        objects.find_objects(view, posture.stamp_ns, camera, posture, heads=[])
         seconds.append(time.thread_time() - start)
     return np.array(seconds)
 
@@ -423,7 +417,7 @@ def _messages(
     for view, posture in views:
         message = encode_image(view, Time(), 'camera')
         start = time.thread_time()
-        percept = detector.look(decode_image(message), posture.stamp_ns, camera, posture)
+        percept = detector.detect(decode_image(message), posture.stamp_ns, camera, posture)
         encode_detections(Header(), percept.detections)
         if percept.face_image is not None:
             encode_image(percept.face_image, Time(), 'camera')

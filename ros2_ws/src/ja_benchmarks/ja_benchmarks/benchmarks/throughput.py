@@ -86,7 +86,7 @@ def _parts() -> NDArray[np.float64]:
         seen, joints = world.observe(), world.joint_state()
         stamps.append(_now_s())
         posture = Posture(seen.stamp_ns, joints.position, joints.velocity)
-        percept = detector.look(seen.image, seen.stamp_ns, camera, posture)
+        percept = detector.detect(seen.image, seen.stamp_ns, camera, posture)
         stamps.append(_now_s())
         step = robot.step(percept.detections, percept.face_image, posture)
         stamps.append(_now_s())

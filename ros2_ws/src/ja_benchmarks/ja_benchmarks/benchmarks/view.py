@@ -14,7 +14,8 @@ from ja_common.core.config import ConfigError
 from ja_common.core.live_page import LIVE_PAGE
 from ja_dashboard.page import PICTURE_URL
 from ja_runner.companion import Companion
-from ja_runner.graph import NodeSpec, sim_graph
+from ja_runner.graph import sim_graph
+from ja_runner.node_spec import NodeSpec
 from ja_runner.progress import ProgressNode
 from ja_runner.run import run_graph
 
@@ -28,10 +29,10 @@ def run() -> dict[str, Row]:
     """Blocks with and without a viewer by turns, so that other load meets both alike."""
     with TemporaryDirectory() as name:
         folder = Path(name)
-        said: list[str] = []
+        announcements: list[str] = []
         spec = NodeSpec('ja_dashboard', 'view')
-        with Companion(spec, folder / 'log', said.append, LIVE_PAGE) as page:
-            blocks = _Blocks(page, said)
+        with Companion(spec, folder / 'log', announcements.append, LIVE_PAGE) as page:
+            blocks = _Blocks(page, announcements)
             code, _ = run_graph(sim_graph(), folder, 'bench view', blocks.tick)
     if code:
         raise ConfigError('the graph did not run to the end of the measurement')
@@ -41,18 +42,18 @@ def run() -> dict[str, Row]:
 class _Blocks:
     """Turns the viewer on and off, and counts the images of each block."""
 
-    def __init__(self, page: Companion, said: list[str]) -> None:
+    def __init__(self, page: Companion, announcements: list[str]) -> None:
         self._page = page
-        self._said = said
+        self._announcements = announcements
         self._viewer: _Viewer | None = None
         self._edge: tuple[float, int] | None = None
         self._rates: dict[bool, list[float]] = {False: [], True: []}
         self._pictures = 0
 
     def tick(self, node: ProgressNode) -> bool:
-        self._page.look()
+        self._page.report_events()
         now_s = time.monotonic()
-        if not self._said or node.elapsed_s < WARM_UP_S:
+        if not self._announcements or node.elapsed_s < WARM_UP_S:
             return False
         if self._edge is None:
             self._edge = (now_s, node.images)
@@ -62,7 +63,7 @@ class _Blocks:
         watched = self._viewer is not None
         self._rates[watched].append((node.images - images) / (now_s - began_s))
         if self._viewer is None:
-            self._viewer = _Viewer(self._said[0].removeprefix(LIVE_PAGE))
+            self._viewer = _Viewer(self._announcements[0].removeprefix(LIVE_PAGE))
             self._viewer.start()
         else:
             self._pictures += self._viewer.stop()
@@ -74,9 +75,9 @@ class _Blocks:
         without, watched = self._rates[False], self._rates[True]
         ratio = np.array(watched) / np.array(without)
         return {
-            'image steps, nobody watches': row(without, 'images/s'),
+            'image steps, no viewer': row(without, 'images/s'),
             'image steps, one viewer': row(watched, 'images/s'),
-            'one viewer against nobody': row(ratio, '(ratio)'),
+            'one viewer against none': row(ratio, '(ratio)'),
             'pictures to the viewer': {
                 'value': self._pictures / (len(watched) * BLOCK_S),
                 'unit': 'pictures/s',

@@ -145,7 +145,7 @@ def blazeface(image: np.ndarray) -> list[Box]:
     """Faces that BlazeFace short range finds in a look at the whole picture, best first."""
     height, width = image.shape[:2]
     square = Box((width - 1) / 2.0, (height - 1) / 2.0, width, width)
-    return [face.box for face in _blazeface().find(image, square)]
+    return [face.box for face in _blazeface().find_faces(image, square)]
 
 
 def haar(image: np.ndarray) -> list[Box]:

@@ -17,7 +17,7 @@ def register(app: typer.Typer) -> None:
 
 
 def doctor(as_json: Json = False) -> None:
-    """Check this machine, and say how to mend what is wrong; exit code 1: no demo can run."""
+    """Check this machine, and print how to fix what is wrong; exit code 1: no demo can run."""
     from rich.console import Console
 
     from ja_diagnostics.doctor import checks
@@ -29,13 +29,13 @@ def doctor(as_json: Json = False) -> None:
             finding = check()
         findings.append(finding)
         if not as_json:
-            mark = 'ok   ' if finding.well else 'WRONG' if finding.needed else '-    '
+            mark = 'ok   ' if finding.ok else 'WRONG' if finding.needed else '-    '
             console.print(f'{mark} {name}: {finding.text}', markup=False, highlight=False)
-            if finding.mend:
-                console.print(f'      {finding.mend}', markup=False, highlight=False)
+            if finding.fix:
+                console.print(f'      {finding.fix}', markup=False, highlight=False)
     if as_json:
         print(json.dumps([asdict(finding) for finding in findings]))
-    sys.exit(int(any(finding.needed and not finding.well for finding in findings)))
+    sys.exit(int(any(finding.needed and not finding.ok for finding in findings)))
 
 
 def topics(
@@ -49,12 +49,12 @@ def topics(
     from rich.console import Console
 
     from ja_common.ros_arguments import check_ros_arguments
-    from ja_diagnostics.topics_table import look_at_topics, table_of_topics
+    from ja_diagnostics.topics_table import measure_topics, table_of_topics
 
     arguments = context.obj or []
     check_ros_arguments(arguments)
     with Console(stderr=True).status('counting messages ...'):
-        rows = look_at_topics(time_s, arguments)
+        rows = measure_topics(time_s, arguments)
     if as_json:
         print(json.dumps([asdict(row) for row in rows]))
     elif rows:

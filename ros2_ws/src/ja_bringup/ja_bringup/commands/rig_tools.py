@@ -28,9 +28,9 @@ def faults(
     from rich.table import Table
 
     from ja_diagnostics.faults.hosts import CASES, missing, run_on_hosts
-    from ja_diagnostics.faults.run import COLUMNS, FaultRun, Outcome
+    from ja_diagnostics.faults.run import COLUMNS, FaultOutcome, FaultRun
 
-    outcomes: list[Outcome] = []
+    outcomes: list[FaultOutcome] = []
     with TemporaryDirectory() as name:
         folder = Path(name)
         run = FaultRun(folder / 'here', typer.echo)
@@ -47,7 +47,7 @@ def faults(
         table.add_row(*outcome.row())
     typer.echo()
     Console(width=130, soft_wrap=True).print(table)
-    sys.exit(int(not outcomes or not all(outcome.well for outcome in outcomes)))
+    sys.exit(int(not outcomes or not all(outcome.ok for outcome in outcomes)))
 
 
 def soak(

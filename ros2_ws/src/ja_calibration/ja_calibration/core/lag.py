@@ -1,8 +1,8 @@
-"""How late the pictures are, from a head that goes to and fro at two speeds.
+"""Fit the delay of the images and the backlash from pan sweeps at two speeds.
 
-On its way at the speed v the camera lags the encoder by backlash / 2 + v * delay. One speed does
-not tell the two apart, two do. So only pictures from the middle of a swing count, where the play
-has long been taken up.
+At the speed v the camera lags the encoder by backlash / 2 + v * delay. One speed does not separate
+the two, two speeds do. Only images from the middle of a swing count: there the gear has crossed
+its backlash.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ja_calibration.core.figure import Figure, jackknife
-from ja_calibration.core.views import Points, View
+from ja_calibration.core.fitted_value import FittedValue, jackknife
+from ja_calibration.core.posed_image import PosedImage, TrackedPoints
 from ja_common.core.stamps import NS_PER_S
 
 LONGEST_DELAY_S = 0.2
@@ -24,30 +24,32 @@ _ROUNDS = 3
 
 
 @dataclass(frozen=True)
-class Swayed:
-    """The views of a sway at one speed, and the encoder: stamps [ns] and pan [rad], (N,)."""
+class SweepRecord:
+    """The images of a sweep at one speed, and the encoder: stamps [ns] and pan [rad], (N,)."""
 
-    views: Sequence[View]
+    images: Sequence[PosedImage]
     stamps_ns: Sequence[int]
     pan: Sequence[float]
 
 
 @dataclass(frozen=True)
 class Lag:
-    """By how much stamps of pictures are later than those of joint states [s]; the play [rad].
+    """Delay of the image stamps behind those of the joint states [s], and pan backlash [rad].
 
-    Positive: a picture shows what the joint states said that much earlier than its stamp.
+    A positive delay: an image shows the posture that the joint states reported so much earlier
+    than its stamp.
     """
 
-    delay_s: Figure
-    backlash: Figure
+    delay_s: FittedValue
+    backlash: FittedValue
 
 
 @dataclass(frozen=True)
-class Track:
-    """What is known of a sway: encoder (N,) [s], [rad]; pictures (M,) [s], [rad], NaN: nothing.
+class PanTrack:
+    """Pan during a sweep, counted from the reference: by the encoder, and by the images.
 
-    Angles of both count from the reference.
+    `joint_times_s` [s] and `joint` [rad], (N,), are the encoder's; `times_s` [s] and `shown`
+    [rad], (M,), the images': NaN where an image shows none of the points.
     """
 
     joint_times_s: NDArray[np.float64]
@@ -56,61 +58,63 @@ class Track:
     shown: NDArray[np.float64]
 
 
-def track_of(swayed: Swayed, reference: View, sign: float, focal_x: float) -> Track:
-    """Measure how far the camera has panned since the reference in each view of a sway."""
-    points = Points(reference.grey)
-    zero_ns = swayed.stamps_ns[0]
-    joint_times_s = (np.array(swayed.stamps_ns) - zero_ns) / NS_PER_S
-    joint = sign * (np.array(swayed.pan) - reference.angles[0])
-    times_s = np.array([(view.stamp_ns - zero_ns) / NS_PER_S for view in swayed.views])
+def measure_pan(
+    sweep: SweepRecord, reference: PosedImage, sign: float, focal_x: float
+) -> PanTrack:
+    """Measure how far the camera has panned since the reference in each image of a sweep."""
+    points = TrackedPoints(reference.grey)
+    zero_ns = sweep.stamps_ns[0]
+    joint_times_s = (np.array(sweep.stamps_ns) - zero_ns) / NS_PER_S
+    joint = sign * (np.array(sweep.pan) - reference.angles[0])
+    times_s = np.array([(image.stamp_ns - zero_ns) / NS_PER_S for image in sweep.images])
     guesses = np.interp(times_s, joint_times_s, joint)
-    # Those near the ends are of no use.
+    # Images near the ends are not used.
     off_centre = np.abs(guesses - (joint.min() + joint.max()) / 2)
     used = off_centre < _USED_SHARE * np.ptp(joint) / 2
     shown = [
-        _picture_angle(points, focal_x, view, guess) if use else np.nan
-        for view, guess, use in zip(swayed.views, guesses, used, strict=True)
+        _pan_in_image(points, focal_x, image, guess) if use else np.nan
+        for image, guess, use in zip(sweep.images, guesses, used, strict=True)
     ]
-    return Track(joint_times_s, joint, times_s, np.array(shown))
+    return PanTrack(joint_times_s, joint, times_s, np.array(shown))
 
 
-def fit_lag(tracks: Sequence[Track]) -> Lag:
-    """Delay and play that explain sways at different speeds best.
+def fit_lag(tracks: Sequence[PanTrack]) -> Lag:
+    """Fit delay and backlash to sweeps at different speeds, by least squares.
 
-    Raises ValueError when too few pictures show the head on its way, or when pictures and joint
-    states are farther apart than can be told.
+    Raises ValueError when too few images show the middle of a swing, or when the delay is longer
+    than `LONGEST_DELAY_S`.
     """
     delay_s = 0.0
-    for _ in range(_ROUNDS):  # which pictures are from the middle depends on the delay
+    for _ in range(_ROUNDS):  # which images are from the middle depends on the delay
         passages = np.array([p for track in tracks for p in _passages(track, delay_s)])
         if len(passages) < _FEWEST_PASSAGES:
             raise ValueError(
-                f'only {len(passages)} swings were seen on their way: is the camera on, and is '
-                'the amplitude large enough?'
+                f'the images show the middle of only {len(passages)} swings: is the camera on, '
+                'and is the amplitude large enough?'
             )
-        delay_s = _explain(passages)[0]
+        delay_s = _fit_passages(passages)[0]
     if abs(delay_s) > LONGEST_DELAY_S:
-        raise ValueError(f'pictures and joint states are more than {LONGEST_DELAY_S:g} s apart')
+        raise ValueError(f'images and joint states are more than {LONGEST_DELAY_S:g} s apart')
     groups = [np.array([index]) for index in range(len(passages))]
-    return Lag(*jackknife(lambda chosen: _explain(passages[chosen]), groups))
+    return Lag(*jackknife(lambda chosen: _fit_passages(passages[chosen]), groups))
 
 
-def _explain(passages: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(delay, backlash) of passages: each its speed, and by how much the camera lags, (N, 2)."""
+def _fit_passages(passages: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(delay [s], backlash [rad]) of passages (N, 2): speed [rad/s] and camera lag [rad]."""
     speed, lag = passages.T
     rows = np.column_stack([speed, np.sign(speed) / 2, np.ones(len(speed))])
     return np.linalg.lstsq(rows, lag, rcond=None)[0][:2]
 
 
-def _passages(track: Track, delay_s: float) -> Iterator[tuple[float, float]]:
+def _passages(track: PanTrack, delay_s: float) -> Iterator[tuple[float, float]]:
     """Speed [rad/s] and lag [rad] of each passage through the middle.
 
-    A line through what the encoder said meanwhile takes its noise and its steps out. (Noise that
-    is interpolated instead draws the delay to halfway between two joint states.)
+    A line fitted to the encoder's angles removes its noise and its steps. (Interpolated noise
+    would draw the delay to halfway between two joint states.)
     """
     low, high = track.joint.min(), track.joint.max()
     middle = np.abs(track.joint - (low + high) / 2) < _MIDDLE_SHARE * (high - low) / 2
-    # Noise at the border of the middle makes crumbs, which are too short.
+    # Noise at the edge of the middle gives passages that are too short; they are dropped.
     edges = np.flatnonzero(np.diff(middle.astype(int), prepend=0, append=0))
     for begin, end in edges.reshape(-1, 2):
         times_s = track.joint_times_s[begin:end]
@@ -124,10 +128,12 @@ def _passages(track: Track, delay_s: float) -> Iterator[tuple[float, float]]:
         yield float(speed), float(np.mean(joint - track.shown[during]))
 
 
-def _picture_angle(points: Points, focal_x: float, view: View, guess_rad: float) -> float:
-    """How far the camera has panned since the points' picture [rad]; NaN if nothing was found."""
-    centre = (view.grey.shape[1] - 1) / 2
-    seen = points.find_in(view.grey, np.array([focal_x * np.tan(guess_rad), 0.0]))
+def _pan_in_image(
+    points: TrackedPoints, focal_x: float, image: PosedImage, guess_rad: float
+) -> float:
+    """Pan of the camera since the image of the points [rad]; NaN if no point was found."""
+    centre = (image.grey.shape[1] - 1) / 2
+    seen = points.find_in(image.grey, np.array([focal_x * np.tan(guess_rad), 0.0]))
     turned = np.arctan((seen[:, 0] - centre) / focal_x) - np.arctan(
         (points.pixels[:, 0] - centre) / focal_x
     )

@@ -13,6 +13,25 @@ class ConfigError(ValueError):
     """A configuration value that cannot be used; the message says which, why and what fits."""
 
 
+class Configuration:
+    """Base of every configuration dataclass: its fields are checked when an object is made.
+
+    Made in Python, from YAML or from ROS parameters, a configuration never holds a value outside
+    its range. A whole number given for a float becomes a float. Derive with
+    `@dataclass(frozen=True)`, and overwrite `check_together` for rules about several fields.
+    """
+
+    def __post_init__(self) -> None:
+        for config_field in fields(self):  # type: ignore[arg-type]
+            if 'description' in config_field.metadata:
+                value = checked(config_field, getattr(self, config_field.name))
+                object.__setattr__(self, config_field.name, value)
+        self.check_together()
+
+    def check_together(self) -> None:
+        """Raise ConfigError when values that fit one by one do not fit each other."""
+
+
 def parameter(
     default: Any,
     description: str,
@@ -21,16 +40,25 @@ def parameter(
     high: float | None = None,
     choices: tuple[str, ...] | None = None,
 ) -> Any:
-    """A dataclass field that documents itself; `low` and `high` are inclusive."""
+    """Make a dataclass field that documents itself; `low` and `high` are inclusive."""
     metadata = {'description': description, 'low': low, 'high': high, 'choices': choices}
     return field(default=default, metadata=metadata)
 
 
+def interval_parameter(
+    default: tuple[float, float], description: str, low: float, high: float
+) -> Any:
+    """Make a field for a rising pair (from, to) of numbers between `low` and `high`."""
+    return field(default=default, metadata={'description': description, 'bounds': (low, high)})
+
+
 def checked(config_field: Field, value: Any) -> Any:
-    """The value as the field's type. Raises ConfigError when type, range or choice do not fit."""
+    """Return the value as the field's type. Raise ConfigError when it does not fit the field."""
     name, default = config_field.name, config_field.default
     if default is MISSING:
         raise TypeError(f'{name} needs a default value to become a parameter')
+    if 'bounds' in config_field.metadata:
+        return _checked_interval(name, value, *config_field.metadata['bounds'])
     value = _converted(name, type(default), value)
     low, high = config_field.metadata.get('low'), config_field.metadata.get('high')
     if (low is not None and value < low) or (high is not None and value > high):
@@ -41,16 +69,18 @@ def checked(config_field: Field, value: Any) -> Any:
     return value
 
 
-def check(config: Any) -> None:
-    """Check every field of a configuration dataclass. Raises ConfigError for the first bad one."""
-    for config_field in fields(config):
-        if 'description' in config_field.metadata:
-            checked(config_field, getattr(config, config_field.name))
+def _checked_interval(name: str, value: Any, low: float, high: float) -> tuple[float, float]:
+    pair = isinstance(value, tuple) and len(value) == 2
+    if not pair or any(type(bound) not in (int, float) for bound in value):
+        raise ConfigError(f'{name} = {value!r} is not a pair [low, high] of numbers')
+    if not low <= value[0] <= value[1] <= high:
+        raise ConfigError(f'{name} = {list(value)} is not a rising pair in [{low}, {high}]')
+    return value
 
 
 def _converted(name: str, wanted: type, value: Any) -> Any:
-    if wanted is float and type(value) is int:
-        value = float(value)
+    if wanted is float and (type(value) is int or isinstance(value, float)):
+        value = float(value)  # a whole number, or a scalar of numpy
     if type(value) is not wanted:
         raise ConfigError(
             f'{name} = {value!r} is {_named(type(value))}; {_named(wanted)} is needed'

@@ -48,8 +48,10 @@ class PostureHistory:
         self._stamps: list[int] = []
         self._samples: list[Posture] = []
 
-    def add(self, stamp_ns: int, position: ArrayLike, velocity: ArrayLike | None = None) -> None:
-        """Add a sample: position (2,) [rad], and velocity (2,) [rad/s] where the encoder gives it.
+    def record_posture(
+        self, stamp_ns: int, position: ArrayLike, velocity: ArrayLike | None = None
+    ) -> None:
+        """Record a sample: position (2,) [rad], and velocity (2,) [rad/s] where the encoder gives it.
 
         Raises ValueError for values that are not two finite numbers; nothing is then added.
         """
@@ -116,7 +118,7 @@ class PostureJoin(Generic[Item]):
         self._depth = depth
         self._waiting: list[tuple[int, Item]] = []
 
-    def add(self, stamp_ns: int, item: Item) -> None:
+    def queue_item(self, stamp_ns: int, item: Item) -> None:
         """Let an item wait for its posture."""
         self._waiting.append((stamp_ns, item))
 
@@ -124,8 +126,8 @@ class PostureJoin(Generic[Item]):
         """How many items wait."""
         return len(self._waiting)
 
-    def ready(self) -> Iterator[tuple[Item, Posture | None]]:
-        """Items whose waiting is over, oldest first, with their posture (None: unknowable).
+    def pop_ready(self) -> Iterator[tuple[Item, Posture | None]]:
+        """Yield the items whose waiting is over, oldest first, with their posture (None: unknowable).
 
         An item is taken out when it is given: if its handling fails, those after it still wait.
         """

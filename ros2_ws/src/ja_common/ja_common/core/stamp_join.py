@@ -1,4 +1,4 @@
-"""Waits until every expected topic has spoken about the same image."""
+"""Waits until one value of each expected topic has come for the same stamp."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -9,8 +9,8 @@ class StampJoin:
 
     Sets older than the newest complete one can no longer matter and are dropped, as is, beyond
     `depth`, the incomplete one that was begun first (not that of the lowest stamp: the clock may
-    have been set back). A completed stamp that is heard again (the same image repeated) starts a
-    new set.
+    have been set back). A completed stamp that comes again (the same image repeated) starts a new
+    set.
     """
 
     def __init__(self, keys: Iterable[str], depth: int = 32) -> None:
@@ -18,8 +18,8 @@ class StampJoin:
         self._depth = depth
         self._sets: dict[int, dict[str, Any]] = {}
 
-    def add(self, key: str, stamp_ns: int, value: Any) -> dict[str, Any] | None:
-        """Add a value; the complete set {key: value} for its stamp, or None while some lack."""
+    def collect_value(self, key: str, stamp_ns: int, value: Any) -> dict[str, Any] | None:
+        """Add a value; return the complete set {key: value} of its stamp, or None while some lack."""
         if key not in self._keys:
             raise KeyError(f'{key!r} is not one of {sorted(self._keys)}')
         collected = self._sets.setdefault(stamp_ns, {})
@@ -32,7 +32,7 @@ class StampJoin:
         return None
 
     def missing(self) -> frozenset[str]:
-        """Keys that the set begun last still lacks (all keys when nothing waits)."""
+        """Return the keys that the newest set still lacks (all keys when nothing waits)."""
         if not self._sets:
             return self._keys
         return self._keys - self._sets[next(reversed(self._sets))].keys()

@@ -1,4 +1,4 @@
-"""Lets what several topics say of each image act in one and the same order in every run."""
+"""Runs the actions for each image in one order, whatever the order in which messages arrive."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,8 +9,8 @@ class StampOrderedDispatcher:
     """For every image the kinds of messages act in turn, and only then those of the next image.
 
     Messages of several publishers arrive in any order, even an answer before its question: the
-    system may halt a publisher between two of its listeners. Whoever lives by more than one topic
-    would live another life in every run.
+    system may halt a publisher between two of its subscribers. A node with more than one topic
+    would then act in another order in every run.
 
     The first kind opens an image. It waits until all kinds have acted for the image before it, or
     until a further message of the first kind shows that the missing ones will not come. What comes
@@ -25,18 +25,18 @@ class StampOrderedDispatcher:
         self._turn = 0  # index of the kind whose turn it is for the open image
         self._waiting: dict[tuple[int, int], Action] = {}
 
-    def add(self, kind: str, stamp_ns: int, action: Action) -> None:
-        """Act when the turn has come: now, or later. Raises ValueError for an unknown kind."""
+    def queue_action(self, kind: str, stamp_ns: int, action: Action) -> None:
+        """Run an action when its turn has come. Raises ValueError for an unknown kind."""
         index = self._kinds.index(kind)
         if index == 0:
-            self._hear_first_kind(stamp_ns)
+            self._open_image(stamp_ns)
         self._waiting[stamp_ns, index] = action
         while (due := self._due()) is not None:
             self._act(due)
         if len(self._waiting) > self._depth:
             del self._waiting[min(self._waiting)]
 
-    def _hear_first_kind(self, stamp_ns: int) -> None:
+    def _open_image(self, stamp_ns: int) -> None:
         if self._open_ns is None:
             self._open_ns, self._turn = stamp_ns, 0
         elif stamp_ns < self._open_ns:
@@ -46,7 +46,7 @@ class StampOrderedDispatcher:
             self._turn = len(self._kinds)
 
     def _due(self) -> tuple[int, int] | None:
-        """Stamp and index of the kind that acts next; None while all have to wait."""
+        """Return stamp and index of the kind that acts next; None while all have to wait."""
         if self._open_ns is None:
             return None
         due = [key for key in self._waiting if key <= (self._open_ns, self._turn)]

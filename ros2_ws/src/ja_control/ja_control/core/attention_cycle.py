@@ -14,7 +14,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_common.core.stamps import NS_PER_S
 from ja_control.core.gating import Gating
@@ -41,7 +41,7 @@ class Source(Enum):
 
 
 @dataclass(frozen=True)
-class AttentionCycleConfig:
+class AttentionCycleConfig(Configuration):
     """Times and tolerances of the cycle."""
 
     dwell_s: float = parameter(
@@ -91,7 +91,7 @@ class AttentionCycleConfig:
 
 
 @dataclass(frozen=True)
-class Percept:
+class CycleInput:
     """What the gate knows about one image: posture at its stamp, and proposals (2,) [rad] or None.
 
     `glance_delta`: to a view that the learner wants before the shift. `fixation`: direction (2,)
@@ -158,7 +158,7 @@ class AttentionCycle:
         self._target = None
         self._begin(Phase.HOME if self.phase is Phase.HOME else Phase.LOOK)
 
-    def step(self, percept: Percept) -> Decision:
+    def step(self, percept: CycleInput) -> Decision:
         """One image: advance the cycle, and say which posture to take."""
         step = {
             Phase.LOOK: self._look,
@@ -180,12 +180,12 @@ class AttentionCycle:
         self._rests_since_ns: int | None = None
         self._face_in_view = True
 
-    def _elapsed_s(self, percept: Percept) -> float:
+    def _elapsed_s(self, percept: CycleInput) -> float:
         if self._since_ns is None:
             self._since_ns = percept.posture.stamp_ns
         return (percept.posture.stamp_ns - self._since_ns) / NS_PER_S
 
-    def _look(self, percept: Percept) -> None:
+    def _look(self, percept: CycleInput) -> None:
         face = percept.face_delta
         if self._face_in_view is not (face is not None):
             # Dwelling on the face and missing it are two waits; each starts anew.
@@ -205,11 +205,11 @@ class AttentionCycle:
             self._begin(Phase.GLANCE)
             self._glance_on(percept)
 
-    def _glance(self, percept: Percept) -> None:
+    def _glance(self, percept: CycleInput) -> None:
         if self._arrived(percept):
             self._glance_on(percept)
 
-    def _glance_on(self, percept: Percept) -> None:
+    def _glance_on(self, percept: CycleInput) -> None:
         """To the next view that is wanted, or else the first shift."""
         if percept.glance_delta is None or self._glances >= self.config.max_glances:
             self._begin(Phase.SHIFT)
@@ -219,7 +219,7 @@ class AttentionCycle:
         self._source = Source.GLANCE
         self._turn(percept, percept.glance_delta)
 
-    def _look_where_the_face_was(self, percept: Percept) -> None:
+    def _look_where_the_face_was(self, percept: CycleInput) -> None:
         self._source = Source.NONE
         if self._caregiver is not None:
             self._target = self._caregiver
@@ -227,7 +227,7 @@ class AttentionCycle:
             self._caregiver = None
             self._begin(Phase.SEARCH)
 
-    def _shift(self, percept: Percept) -> None:
+    def _shift(self, percept: CycleInput) -> None:
         if not self._arrived(percept):
             return
         if percept.fixation is None and self._rested_s(percept) < self.config.fixation_wait_s:
@@ -241,7 +241,7 @@ class AttentionCycle:
         if self._caregiver is not None:
             self._target = self._caregiver
 
-    def _draw(self, percept: Percept) -> None:
+    def _draw(self, percept: CycleInput) -> None:
         # Drawn whether or not the learner has an answer: the same seed gives the same sequence of
         # sources.
         if self._shifts == 0 or self.config.source_drawn == 'every_shift':
@@ -252,18 +252,18 @@ class AttentionCycle:
             self._source, delta = Source.VISUAL_FEEDBACK, percept.vf_delta
         self._turn(percept, np.zeros(2) if delta is None else delta)
 
-    def _turn(self, percept: Percept, delta: NDArray[np.float64]) -> None:
+    def _turn(self, percept: CycleInput, delta: NDArray[np.float64]) -> None:
         self._target = percept.posture.position + delta
         self._since_ns = percept.posture.stamp_ns
         self._rests_since_ns = None
 
-    def _rested_s(self, percept: Percept) -> float:
+    def _rested_s(self, percept: CycleInput) -> float:
         """How long the head has been where the shift has led."""
         if self._rests_since_ns is None:
             self._rests_since_ns = percept.posture.stamp_ns
         return (percept.posture.stamp_ns - self._rests_since_ns) / NS_PER_S
 
-    def _search(self, percept: Percept) -> None:
+    def _search(self, percept: CycleInput) -> None:
         if percept.face_delta is not None:
             self._begin(Phase.LOOK)
             self._look(percept)
@@ -273,7 +273,7 @@ class AttentionCycle:
         sweep = [c.search_pan_rad * math.sin(angle), c.search_tilt_rad * math.sin(3 * angle)]
         self._target = self._home_posture() + sweep
 
-    def _home(self, percept: Percept) -> None:
+    def _home(self, percept: CycleInput) -> None:
         self._target = self._home_posture()
         if self._arrived(percept):
             self._begin(Phase.LOOK)
@@ -281,10 +281,10 @@ class AttentionCycle:
     def _home_posture(self) -> NDArray[np.float64]:
         return np.array([self.config.home_pan_rad, self.config.home_tilt_rad])
 
-    def _still(self, percept: Percept) -> bool:
+    def _still(self, percept: CycleInput) -> bool:
         return percept.posture.is_still(self.config.still_below_rad_s)
 
-    def _arrived(self, percept: Percept) -> bool:
+    def _arrived(self, percept: CycleInput) -> bool:
         if self._elapsed_s(percept) >= self.config.settle_timeout_s:
             return True
         return (

@@ -1,11 +1,11 @@
-"""The guard between deciding and moving: what passes is safe, what is missing holds the head.
+"""The guard of the commands: every command is safe, and missing input holds the head.
 
-In this order: an aim must be finite; what was heard must be fresh; aims within the dead zone of
-the last one are the last one; the motion profile limits speed and acceleration, relative to the
-*previous command*; aims lie inside the position limits by a soft margin, which only braking may
-use. After every hold the command begins anew at the measured posture, at rest.
+The checks, in this order: a target must be finite; the inputs must be fresh; a target within the
+dead zone of the last one is ignored; the motion profile limits speed and acceleration, relative
+to the *previous command*; targets keep a soft margin to the position limits, which only braking
+may use. After every hold the command restarts at the measured posture, at rest.
 
-Time is any clock that only runs forward, in seconds; if it runs back, all that was heard is void.
+Time is any clock that only runs forward, in seconds; if it runs back, all inputs are discarded.
 """
 
 import math
@@ -15,28 +15,31 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.core.health import Level
 from ja_control.core.joint_limits import JointLimits, JointLimitsConfig
 from ja_control.core.motion_profile import MotionProfile
 
 _PROGRESS_RAD = 0.02
-"""A joint that has come so much nearer to its command is on its way, not stalled."""
+"""A joint that has come this much nearer to its command moves; it is not stalled."""
 
 
 @dataclass(frozen=True)
-class CommandGuardConfig:
+class CommandGuardConfig(Configuration):
     """When the head is held, and when it moves again."""
 
     dead_zone_rad: float = parameter(
-        0.003, 'a joint whose new aim is no farther from the last one keeps that',
+        0.003, 'a joint keeps its last target when the new one is no farther from it than this',
         low=0.0, high=0.2,
     )  # fmt: skip
     stale_after_s: float = parameter(
         0.5, 'hold when the newest image or joint state is older', low=0.02, high=60.0
     )
     hold_after_s: float = parameter(
-        0.13, 'hold when no image has been judged by all for so long', low=0.02, high=60.0
+        0.13,
+        'hold when the proposals for an image have not been complete for so long',
+        low=0.02,
+        high=60.0,
     )
     stall_error_rad: float = parameter(
         0.1, 'a joint farther than this from its command must come nearer', low=0.01, high=3.0
@@ -79,7 +82,7 @@ class Hold:
 
     @property
     def level(self) -> Level:
-        """ERROR where somebody must do something."""
+        """Return ERROR where a person must act, else WARN."""
         return Level.ERROR if self.cause in (Cause.OUTSIDE, Cause.STALLED) else Level.WARN
 
 
@@ -87,8 +90,8 @@ class Hold:
 class Command:
     """What to send: position (2,) [rad] and velocity (2,) [rad/s] of (pan, tilt).
 
-    `position` is None while nothing may be sent: until the head has begun for the first time.
-    `clamped` names the limits that have cut the motion ('' for none), `hold` why the head is held.
+    `position` is None while nothing may be sent: until the head moves for the first time.
+    `clamped` names the limits that cut the motion ('' for none), `hold` why the head is held.
     """
 
     position: NDArray[np.float64] | None
@@ -98,7 +101,10 @@ class Command:
 
 
 class CommandGuard:
-    """Every command passes here; one `step` a control period."""
+    """Turns targets into safe commands: call `step` once a control period.
+
+    `blocked`: a reason of the caller to hold the head; '' for none.
+    """
 
     def __init__(
         self,
@@ -116,67 +122,73 @@ class CommandGuard:
         self._enabled = enabled
         self._latched: Hold | None = None
         self._joints: list[MotionProfile] | None = None
-        self._aim = np.zeros(2)
+        self._target = np.zeros(2)
         self._follow_since_s = np.zeros(2)
         self._measured: NDArray[np.float64] | None = None
         self._follow_from: NDArray[np.float64] | None = None
         self._now_s = -math.inf
-        self._forget()
+        self._discard_inputs()
 
     @property
     def engaged(self) -> bool:
-        """Does the head follow aims? Not during a hold, nor before it has begun anew."""
+        """Return whether the head follows targets: not in a hold, nor before the restart after it."""
         return self._engaged
 
     @property
     def enabled(self) -> bool:
-        """As last told."""
+        """Return whether motion is allowed, as set by `enable`."""
         return self._enabled
 
     def enable(self, enabled: bool) -> None:
-        """Allow motion or forbid it; allowing it releases what was latched."""
+        """Allow motion or forbid it; allowing it releases a latched hold."""
         self._enabled = enabled
         if enabled:
             self._latched = None
             self._stalled_until_s = -math.inf
 
     def set_limits(self, limits: JointLimitsConfig) -> None:
-        """New limits; they hold from where the head, braked by the old ones, stands still."""
+        """Set new limits; they apply once the head, braked by the old ones, stands still."""
         self._new_limits = limits
 
-    def begin_anew(self) -> None:
-        """Brake, and start again from the measured posture."""
+    def restart(self) -> None:
+        """Brake, and restart from the measured posture."""
         self._engaged = False
 
-    def hear_image(self, now_s: float, age_s: float) -> None:
-        """An image of this age [s] has been judged by everybody."""
-        self._run_on(now_s)
-        self._judged_s = now_s
-        self._taken_s = now_s - age_s
+    def record_image(self, now_s: float, age_s: float) -> None:
+        """Record that all proposals for an image of this age [s] have come."""
+        self._advance_clock(now_s)
+        self._complete_s = now_s
+        self._image_s = now_s - age_s
 
-    def hear_joints(self, position: ArrayLike, now_s: float, age_s: float) -> None:
-        """The newest measured posture (2,) [rad] and its age. Raises ValueError if not finite."""
+    def record_joints(self, position: ArrayLike, now_s: float, age_s: float) -> None:
+        """Record the newest measured posture (2,) [rad] and its age [s].
+
+        Raises ValueError when it is not finite.
+        """
         measured = _two_finite('measured posture', position)
-        self._run_on(now_s)
+        self._advance_clock(now_s)
         self._measured = measured
         self._measured_s = now_s - age_s
 
-    def aim(self, target: ArrayLike) -> None:
-        """Where to go, (2,) [rad]. Raises ValueError when it is not finite: the aim stays."""
+    def set_target(self, target: ArrayLike) -> None:
+        """Set the posture to go to, (2,) [rad].
+
+        Raises ValueError when it is not finite; the last target then stays.
+        """
         target = _two_finite('target posture', target)
-        far = np.abs(target - self._aim) > self.config.dead_zone_rad
-        self._aim = np.where(far, target, self._aim)
+        far = np.abs(target - self._target) > self.config.dead_zone_rad
+        self._target = np.where(far, target, self._target)
 
     def step(self, now_s: float, periods: int = 1) -> Command:
-        """The command for now; the profile advances by so many control periods."""
-        self._run_on(now_s)
-        hold = self._why_hold()
+        """Return the command for now; the profile advances by so many control periods."""
+        self._advance_clock(now_s)
+        hold = self._find_hold()
         if hold is not None:
-            self._hold(hold)
+            self._enter_hold(hold)
         cut: set[str] = set()
         for _ in range(periods):
             self._advance(hold, cut)
-        if hold is None and not np.array_equal(self.limits.reachable(self._aim), self._aim):
+        if hold is None and not np.array_equal(self.limits.reachable(self._target), self._target):
             cut.add('position')
         if self._joints is None:
             return Command(None, np.zeros(2), '', hold)
@@ -187,14 +199,14 @@ class CommandGuard:
             hold,
         )
 
-    def _run_on(self, now_s: float) -> None:
+    def _advance_clock(self, now_s: float) -> None:
         if now_s < self._now_s:
-            self._forget()
+            self._discard_inputs()
         self._now_s = now_s
 
-    def _forget(self) -> None:
+    def _discard_inputs(self) -> None:
         self._measured = None
-        self._measured_s = self._taken_s = self._judged_s = -math.inf
+        self._measured_s = self._image_s = self._complete_s = -math.inf
         self._stalled_until_s = -math.inf
         self._follow_from = None
         self._engaged = False
@@ -203,9 +215,9 @@ class CommandGuard:
         """One control period."""
         at_rest = self._joints is None or not any(joint.velocity for joint in self._joints)
         if at_rest and self._new_limits is not None:
-            self._take_new_limits()
+            self._apply_new_limits()
         if at_rest and hold is None and not self._engaged:
-            self._begin()
+            self._start()
         if self._joints is None:
             return
         follow = self._engaged or (hold is not None and hold.cause is Cause.STALLED)
@@ -213,18 +225,18 @@ class CommandGuard:
             for joint in self._joints:
                 joint.brake()
             return
-        for joint, aim in zip(self._joints, self.limits.reachable(self._aim), strict=True):
-            if limit := joint.approach(float(aim)):
+        for joint, target in zip(self._joints, self.limits.reachable(self._target), strict=True):
+            if limit := joint.approach(float(target)):
                 cut.add(limit)
 
-    def _begin(self) -> None:
-        assert self._measured is not None, 'a hold until joint states come'
+    def _start(self) -> None:
+        assert self._measured is not None, 'the guard holds until joint states come'
         self._joints = self._profiles(self._measured)
-        self._aim = self._measured
+        self._target = self._measured
         self._follow_from = None
         self._engaged = True
 
-    def _take_new_limits(self) -> None:
+    def _apply_new_limits(self) -> None:
         assert self._new_limits is not None
         self._limits_config, self._new_limits = self._new_limits, None
         self.limits = JointLimits(self._limits_config)
@@ -240,15 +252,15 @@ class CommandGuard:
             for position in np.asarray(posture)
         ]
 
-    def _hold(self, hold: Hold) -> None:
+    def _enter_hold(self, hold: Hold) -> None:
         if self._engaged and hold.cause is Cause.STALLED and self._measured is not None:
             # Do not push against what blocks the joint.
-            self._aim = self._measured
+            self._target = self._measured
         if self._engaged and self.config.latch_faults and hold.cause is not Cause.DISABLED:
             self._latched = replace(hold, text=f'{hold.text}; latched until enable is called')
         self._engaged = False
 
-    def _why_hold(self) -> Hold | None:
+    def _find_hold(self) -> Hold | None:
         c, now_s = self.config, self._now_s
         if not self._enabled:
             return Hold(Cause.DISABLED, 'disabled')
@@ -258,20 +270,20 @@ class CommandGuard:
             return Hold(Cause.BLOCKED, self.blocked)
         if self._measured is None:
             return Hold(Cause.WAITING, 'no joint state yet')
-        if math.isinf(self._judged_s):
+        if math.isinf(self._complete_s):
             return Hold(Cause.WAITING, 'no complete image yet')
         # A stamp ahead of the clock is as wrong as an old one: its age cannot be known.
         for cause, stamp_s, what in (
-            (Cause.STALE_IMAGE, self._taken_s, 'image'),
+            (Cause.STALE_IMAGE, self._image_s, 'image'),
             (Cause.STALE_JOINTS, self._measured_s, 'joint state'),
         ):
             if now_s - stamp_s > c.stale_after_s:
                 return Hold(cause, f'the newest {what} is older than {c.stale_after_s:g} s')
             if stamp_s - now_s > c.stale_after_s:
                 return Hold(cause, f'the newest {what} is stamped ahead of the clock')
-        if now_s - self._judged_s > c.hold_after_s:
+        if now_s - self._complete_s > c.hold_after_s:
             return Hold(Cause.SILENT, f'no complete image for {c.hold_after_s:g} s')
-        if now_s < self._stalled_until_s or self._does_not_follow():
+        if now_s < self._stalled_until_s or self._is_stalled():
             text = f'a joint does not follow its command within {c.stall_error_rad:g} rad'
             return Hold(Cause.STALLED, text)
         if not self._engaged and self.limits.excess_rad(self._measured) > c.outside_rad:
@@ -279,22 +291,22 @@ class CommandGuard:
             return Hold(Cause.OUTSIDE, f'{text}: {self._measured[0]:.3g}, {self._measured[1]:.3g}')
         return None
 
-    def _does_not_follow(self) -> bool:
-        """Has a joint far from its command come no nearer for `stall_after_s`?
+    def _is_stalled(self) -> bool:
+        """Whether a joint far from its command has come no nearer for `stall_after_s`.
 
-        By the times of the measurements: a joint of which nothing is heard is stale, not stalled.
+        Uses the times of the measurements: a joint without new measurements is stale, not stalled.
         """
         if not self._engaged or self._joints is None or self._measured is None:
             return False
-        way = np.array([joint.position for joint in self._joints]) - self._measured
-        far = np.abs(way) > self.config.stall_error_rad
+        gap = np.array([joint.position for joint in self._joints]) - self._measured
+        far = np.abs(gap) > self.config.stall_error_rad
         if self._follow_from is None:
             self._follow_from = self._measured.copy()
             self._follow_since_s = np.full(2, self._measured_s)
-        came = np.sign(way) * (self._measured - self._follow_from)
-        fine = ~far | (came > _PROGRESS_RAD)
-        self._follow_from[fine] = self._measured[fine]
-        self._follow_since_s[fine] = self._measured_s
+        progress = np.sign(gap) * (self._measured - self._follow_from)
+        moving = ~far | (progress > _PROGRESS_RAD)
+        self._follow_from[moving] = self._measured[moving]
+        self._follow_since_s[moving] = self._measured_s
         if np.all(self._measured_s - self._follow_since_s <= self.config.stall_after_s):
             return False
         self._stalled_until_s = self._now_s + self.config.retry_after_s

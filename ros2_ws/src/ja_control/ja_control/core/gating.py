@@ -1,18 +1,18 @@
 """Gating functions: probability p(LM) that a shift follows the learning module.
 
-The paper's sigmoid (Fig. 6 (a)) follows a clock: the number of trials. Its future work asks for a
-gate that follows the robot's own performance; that is `evidence`.
+The paper's sigmoid (Fig. 6 (a)) depends on the number of trials. Its future work asks for a gate
+that depends on the robot's own performance: `evidence`.
 """
 
 import math
 from dataclasses import dataclass
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 
 
 @dataclass(frozen=True)
-class GatingConfig:
-    """Which gating function, and its numbers."""
+class GatingConfig(Configuration):
+    """The gating function and its numbers."""
 
     gating: str = parameter(
         'sigmoid',
@@ -28,8 +28,8 @@ class GatingConfig:
     )
     evidence_centre_nats: float = parameter(
         3.0,
-        'log evidence at which p(LM) is at half its maximum: by chance it comes so far in less '
-        'than one of exp(3) = 20 lives',
+        'log evidence at which p(LM) is at half its maximum: by chance it reaches 3 in less '
+        'than one of exp(3) = 20 runs',
         low=-50.0, high=50.0,
     )  # fmt: skip
     p_lm_max: float = parameter(
@@ -44,10 +44,10 @@ class Gating:
         self._config = config
 
     def p_lm(self, trials: int, log_evidence: float = 0.0) -> float:
-        """Probability, 0-1, that the next shift takes the learner's proposal.
+        """Return the probability, 0-1, that the next shift takes the learner's proposal.
 
-        `log_evidence` [nats]: log Bayes factor of 'the face tells the learner something' against
-        'chance'. With even odds at first, p(LM) is how probable the former is, but for the centre.
+        `log_evidence` [nats]: log Bayes factor of 'the learner predicts better than chance' against
+        'chance'. With even prior odds and a centre of 0, p(LM) is the probability of the former.
         """
         c = self._config
         if c.gating == 'constant':
@@ -59,5 +59,5 @@ class Gating:
 
 
 def _logistic(argument: float) -> float:
-    """Written so that it cannot overflow."""
+    """1 / (1 + exp(-argument)), without overflow."""
     return 0.5 * (1 + math.tanh(argument / 2))

@@ -1,15 +1,15 @@
-"""What each joint may do: position, soft margin, speed, acceleration."""
+"""Limits of each joint: position, soft margin, speed, acceleration."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ja_common.core.config import ConfigError, parameter
+from ja_common.core.config import ConfigError, Configuration, parameter
 
 
 @dataclass(frozen=True)
-class JointLimitsConfig:
+class JointLimitsConfig(Configuration):
     """Limits of the two joints; the defaults suit the paper's head, and people in front of it."""
 
     pan_min_rad: float = parameter(-1.05, 'rightmost pan', low=-3.15, high=3.15)
@@ -17,7 +17,7 @@ class JointLimitsConfig:
     tilt_min_rad: float = parameter(-0.61, 'highest tilt (up is negative)', low=-1.57, high=1.57)
     tilt_max_rad: float = parameter(0.61, 'lowest tilt (down is positive)', low=-1.57, high=1.57)
     soft_margin_rad: float = parameter(
-        0.02, 'no aim is nearer to a position limit than this', low=0.0, high=0.5
+        0.02, 'no target is nearer to a position limit than this', low=0.0, high=0.5
     )
     max_speed_rad_s: float = parameter(
         2.0, 'fastest change of the commanded posture of each joint', low=0.01, high=50.0
@@ -26,7 +26,8 @@ class JointLimitsConfig:
         40.0, 'fastest change of that speed', low=0.01, high=1e4
     )
 
-    def __post_init__(self) -> None:
+    def check_together(self) -> None:
+        """Raise ConfigError when the limits leave a joint no room to move."""
         room = min(self.pan_max_rad - self.pan_min_rad, self.tilt_max_rad - self.tilt_min_rad)
         if room <= 0.0:
             raise ConfigError('each joint needs a lower limit below its upper limit')
@@ -45,13 +46,13 @@ class JointLimits:
         self.margin = config.soft_margin_rad
 
     def clip(self, posture: ArrayLike) -> NDArray[np.float64]:
-        """The nearest posture (2,) [rad] inside the position limits."""
+        """Return the nearest posture (2,) [rad] inside the position limits."""
         return np.clip(np.asarray(posture, float), self.low, self.high)
 
     def reachable(self, posture: ArrayLike) -> NDArray[np.float64]:
-        """The nearest posture (2,) [rad] that may be an aim: inside the soft margin."""
+        """Return the nearest posture (2,) [rad] that may be a target: inside the soft margin."""
         return np.clip(np.asarray(posture, float), self.low + self.margin, self.high - self.margin)
 
     def excess_rad(self, posture: ArrayLike) -> float:
-        """How far [rad] the joint that is farthest out stands outside; 0 inside."""
+        """Return by how much [rad] the joint that is farthest out exceeds its limits; 0 inside."""
         return float(np.max(np.abs(np.asarray(posture, float) - self.clip(posture))))

@@ -1,11 +1,11 @@
-"""The number of finished trials, which p(LM) depends on, outlives the process."""
+"""The count of finished trials, on which p(LM) depends, in a file."""
 
 import os
 from pathlib import Path
 
 
 def load_trials(path: Path) -> int:
-    """The count in a file; 0 when there is none. Raises ValueError when it holds no count."""
+    """Return the count in a file; 0 without a file. Raises ValueError when it holds no count."""
     try:
         text = path.read_text(encoding='ascii')
         return int(text) if text.strip().isdecimal() else _refuse(path)
@@ -16,7 +16,7 @@ def load_trials(path: Path) -> int:
 
 
 def save_trials(path: Path, trials: int) -> None:
-    """Write the count so that at any instant the file is the old or the new one."""
+    """Write the count atomically: the file is always the old or the new one."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f'.{path.name}.{os.getpid()}')
     temporary.write_text(f'{trials}\n', encoding='ascii')

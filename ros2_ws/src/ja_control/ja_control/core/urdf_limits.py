@@ -1,4 +1,4 @@
-"""Joint limits from a URDF: what `robot_description` says of the two joints of the head."""
+"""Joint limits of the two joints of the head from a URDF (`robot_description`)."""
 
 import math
 import xml.etree.ElementTree as ElementTree
@@ -28,7 +28,10 @@ class UrdfJoint:
 
 
 def read_joint(urdf: str, name: str) -> UrdfJoint:
-    """One joint of a URDF, all joints at zero. Raises ValueError with what is missing or wrong."""
+    """Return one joint of a URDF, all joints at zero.
+
+    Raises ValueError with what is missing or wrong.
+    """
     try:
         robot = ElementTree.fromstring(urdf)
     except ElementTree.ParseError as error:
@@ -52,10 +55,10 @@ def read_joint(urdf: str, name: str) -> UrdfJoint:
     return UrdfJoint(low, high, speed, turned / max(float(np.linalg.norm(turned)), 1e-12))
 
 
-def narrowed(
+def narrow_limits(
     limits: JointLimitsConfig, pan: UrdfJoint, tilt: UrdfJoint, signs: NDArray, offsets: NDArray
 ) -> JointLimitsConfig:
-    """The narrower of the limits and those of a URDF.
+    """Return the narrower of the limits and those of a URDF.
 
     `signs` and `offsets` (2,) [rad] are the rig's: rig angle = sign * angle + offset. Raises
     ValueError when an axis of the URDF contradicts the sign, or nothing is left between limits.
@@ -102,7 +105,7 @@ def _rotation_to_root(
         rotation = _rpy(_numbers(current.find('origin'), 'rpy', '0 0 0')) @ rotation
         current = by_child.get(_link(current, 'parent'))
     if current is not None:
-        raise ValueError('the joints of the robot description run in a circle')
+        raise ValueError('the joints of the robot description form a loop')
     return rotation
 
 
@@ -112,7 +115,7 @@ def _link(joint: ElementTree.Element, role: str) -> str:
 
 
 def _rpy(angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Fixed axes x, y, z, as URDF has it."""
+    """Rotation (3, 3) about the fixed axes x, y, z, as in URDF."""
     (cr, cp, cy), (sr, sp, sy) = np.cos(angles), np.sin(angles)
     return np.array(
         [

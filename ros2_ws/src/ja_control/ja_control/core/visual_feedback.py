@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 
 
 @dataclass(frozen=True)
-class VisualFeedbackConfig:
+class VisualFeedbackConfig(Configuration):
     """The one number of Eq. 2."""
 
     gain: float = parameter(
@@ -18,11 +18,11 @@ class VisualFeedbackConfig:
 
 
 def visual_feedback(ray: ArrayLike, gain: float) -> NDArray[np.float64]:
-    """Change of posture (pan, tilt), shape (2,) [rad], that centres what is seen at a ray (x, y).
+    """Return the change of posture (pan, tilt), (2,) [rad], that centres an object at a ray (x, y).
 
     Eq. 2: (dpan, dtilt) = g (x_i - c_x, y_i - c_y), with the distance from the centre in units of
-    the focal length and the axes of REP-103: what is right of the centre needs negative pan, what
-    is below needs positive tilt.
+    the focal length and the axes of REP-103: an object right of the centre needs negative pan,
+    one below it positive tilt.
     """
     x, y = np.asarray(ray, float)
     return gain * np.array([-x, y])

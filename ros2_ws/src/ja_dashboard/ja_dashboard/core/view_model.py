@@ -31,7 +31,7 @@ _DOING = {
 _CURVE_EVERY_S = 1.0
 
 
-class Run(Enum):
+class RunState(Enum):
     """What the graph as a whole is doing."""
 
     WAITING = 'waiting'
@@ -45,13 +45,13 @@ class Run(Enum):
 class State:
     """What the graph is doing, and why in one sentence."""
 
-    run: Run
+    run: RunState
     text: str
 
     @property
     def is_live(self) -> bool:
         """Is the picture of now?"""
-        return self.run in (Run.RUNNING, Run.HELD)
+        return self.run in (RunState.RUNNING, RunState.HELD)
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Light:
 
 
 @dataclass(frozen=True)
-class Truth:
+class TruthView:
     """Where the objects of the sim are, (n, 3) [m] and (n, 2) [rad]; which one she means."""
 
     positions: NDArray[np.float64]
@@ -100,7 +100,7 @@ class Glance:
     detections: Sequence[Detection] = ()
     directions: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
     belief: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
-    truth: Truth | None = None
+    truth: TruthView | None = None
 
 
 @dataclass(frozen=True)
@@ -191,14 +191,14 @@ class ViewModel:
         silent_s = now_s - self._new_image_s
         if silent_s < STOPPED_AFTER_S and self._stamp_ns is not None:
             if reason := self.gate.get('reason'):
-                return State(Run.HELD, f'the gate holds the head: {reason}')
-            return State(Run.RUNNING, self._doing())
+                return State(RunState.HELD, f'the gate holds the head: {reason}')
+            return State(RunState.RUNNING, self._doing())
         if self._stamp_ns is None and silent_s < STOPPED_AFTER_S:
-            return State(Run.WAITING, 'waiting for the first image')
+            return State(RunState.WAITING, 'waiting for the first image')
         repeated = now_s - self._any_image_s < STOPPED_AFTER_S
         if repeated and self._says('paused') == 'True':
-            return State(Run.PAUSED, 'the simulation is paused')
-        return State(Run.STOPPED, f'no new image for {silent_s:.0f} s')
+            return State(RunState.PAUSED, 'the simulation is paused')
+        return State(RunState.STOPPED, f'no new image for {silent_s:.0f} s')
 
     def _doing(self) -> str:
         phase, source = self.gate.get('phase', ''), self.gate.get('source', '')

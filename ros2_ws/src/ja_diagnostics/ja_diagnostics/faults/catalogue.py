@@ -1,4 +1,4 @@
-"""The faults: how each begins and ends, how long it lasts, and whether the head has to stop."""
+"""All faults: how each begins and ends, how long it lasts, and whether the head has to stop."""
 
 import os
 import signal
@@ -20,14 +20,14 @@ _disorder = partial(Disturbance, swapped=True)
 
 @dataclass(frozen=True)
 class Graph:
-    """What a fault can get at: the processes by node, and the relay behind the head."""
+    """What a fault acts on: the process of each node, and the relay behind the head."""
 
     pids: Callable[[], Mapping[str, int]]
     relay: Relay
 
-    def send(self, thing: str, number: int) -> None:
-        """A signal to a node's process."""
-        os.kill(self.pids()[thing], number)
+    def send_signal(self, node: str, number: int) -> None:
+        """Send a signal to a node's process."""
+        os.kill(self.pids()[node], number)
 
 
 Action = Callable[[Graph], None]
@@ -35,7 +35,7 @@ Action = Callable[[Graph], None]
 
 @dataclass(frozen=True)
 class Fault:
-    """`stops`: has the head to stop? Else it has to go on."""
+    """A fault. `stops`: does the head have to stop? If not, it has to go on."""
 
     name: str
     begin: Action
@@ -44,10 +44,10 @@ class Fault:
     stops: bool = True
 
 
-def faults(things: list[str]) -> list[Fault]:
-    """All faults of a graph with these nodes in processes of their own."""
+def faults(nodes: list[str]) -> list[Fault]:
+    """Return all faults of a graph with these nodes, each in its own process."""
     return [
-        *(fault for thing in things for fault in (_killed(thing), _frozen(thing))),
+        *(fault for node in nodes for fault in (_killed(node), _frozen(node))),
         _disturbed('camera stopped', _CAMERA, _silence),
         _disturbed('joint states stopped', _JOINTS, _silence),
         _disturbed('joint states delayed by 0.1 s', _JOINTS, _delay, stops=False),
@@ -56,18 +56,18 @@ def faults(things: list[str]) -> list[Fault]:
     ]
 
 
-def _killed(thing: str) -> Fault:
-    # Restarted by the supervisor, at once: no Python is up again before this is over.
+def _killed(node: str) -> Fault:
+    # The supervisor restarts the node at once; no Python is running again before 0.5 s.
     return Fault(
-        f'{thing} killed -9', lambda graph: graph.send(thing, signal.SIGKILL), _nothing, 0.5
+        f'{node} killed -9', lambda graph: graph.send_signal(node, signal.SIGKILL), _nothing, 0.5
     )
 
 
-def _frozen(thing: str) -> Fault:
+def _frozen(node: str) -> Fault:
     return Fault(
-        f'{thing} frozen',
-        lambda graph: graph.send(thing, signal.SIGSTOP),
-        lambda graph: graph.send(thing, signal.SIGCONT),
+        f'{node} frozen',
+        lambda graph: graph.send_signal(node, signal.SIGSTOP),
+        lambda graph: graph.send_signal(node, signal.SIGCONT),
     )
 
 

@@ -1,4 +1,4 @@
-"""What a bad driver or link does to a stream of messages: silence, delay, disorder."""
+"""The effect of a bad driver or link on a stream of messages: silence, delay, disorder."""
 
 import heapq
 from collections.abc import Iterator
@@ -8,7 +8,7 @@ from typing import Any
 
 @dataclass
 class Disturbance:
-    """Hands messages on: as they come, or not, or later, or in pairs the wrong way round."""
+    """A queue that forwards messages at once, never, later, or in pairs in the wrong order."""
 
     silent: bool = False
     delay_s: float = 0.0
@@ -17,23 +17,23 @@ class Disturbance:
     _count: int = 0
     _overtaken: Any = None
 
-    def put(self, message: Any, now_s: float) -> None:
-        """A message comes in, at a time [s] of a clock that runs forward."""
+    def queue_message(self, message: Any, now_s: float) -> None:
+        """Queue a message that arrives at a time [s] of a clock that only runs forward."""
         if self.silent:
             return
         if self.swapped and self._overtaken is None:
             self._overtaken = message
             return
-        self._hand_on(message, now_s)
+        self._schedule(message, now_s)
         if self._overtaken is not None:
             overtaken, self._overtaken = self._overtaken, None
-            self._hand_on(overtaken, now_s)
+            self._schedule(overtaken, now_s)
 
-    def due(self, now_s: float) -> Iterator[Any]:
-        """The messages that go out now, in their order."""
+    def pop_due(self, now_s: float) -> Iterator[Any]:
+        """Yield the messages that go out now, in their order."""
         while self._waiting and self._waiting[0][0] <= now_s:
             yield heapq.heappop(self._waiting)[-1]
 
-    def _hand_on(self, message: Any, now_s: float) -> None:
-        self._count += 1  # those that are due together keep their order
+    def _schedule(self, message: Any, now_s: float) -> None:
+        self._count += 1  # messages that are due together keep their order
         heapq.heappush(self._waiting, (now_s + self.delay_s, self._count, message))

@@ -1,7 +1,7 @@
-"""Faults that need hosts of their own: network and /dev/shm of no other process on this machine.
+"""Faults that need hosts of their own: a network and a /dev/shm that no other process uses.
 
-Linux gives them as namespaces, to root alone. `python -m ja_diagnostics.faults.hosts CASE FOLDER`
-is the near host; what it makes ends with it.
+Linux makes them as namespaces, for root only. `python -m ja_diagnostics.faults.hosts CASE FOLDER`
+runs inside the near host; all that it makes ends with it.
 """
 
 import json
@@ -10,21 +10,21 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_diagnostics.faults.catalogue import Fault
-from ja_diagnostics.faults.run import FaultRun, Outcome
-from ja_runner.graph import NodeSpec
+from ja_diagnostics.faults.run import FaultOutcome, FaultRun
+from ja_runner.node_spec import NodeSpec
 
 _RESULT = 'outcome.json'
 _NEAR, _FAR = '10.77.0.1/24', '10.77.0.2/24'
 _FULL_BYTES = 40 * 2**20
 _SEGMENT_BYTES = 8 * 2**20
-# A participant that dies without a word, and leaves its segment behind.
+# A participant that kills itself, and leaves its segment behind.
 _DIES = 'import os, rclpy; rclpy.init(); node = rclpy.create_node("dies"); os.kill(os.getpid(), 9)'
 
 
@@ -35,11 +35,12 @@ class _FarNode(NodeSpec):
     host: int = 0
 
     def command(self) -> list[str]:
+        """Return the command line that runs the node on the other host."""
         return ['nsenter', f'--target={self.host}', '--net', '--mount', '--', *super().command()]
 
 
 def missing() -> str:
-    """Why hosts cannot be made here; '' if they can."""
+    """Return why hosts cannot be made here; '' if they can."""
     if absent := [
         tool for tool in ('unshare', 'nsenter', 'ip', 'mount') if not shutil.which(tool)
     ]:
@@ -47,16 +48,16 @@ def missing() -> str:
     tried = subprocess.run(
         ['unshare', '--net', '--mount', 'true'], capture_output=True, text=True, check=False
     )
-    return '' if tried.returncode == 0 else f'{tried.stderr.strip()} (it takes root)'
+    return '' if tried.returncode == 0 else f'{tried.stderr.strip()} (needs root)'
 
 
-def run_on_hosts(case: str, folder: Path, report: Callable[[str], None]) -> Outcome:
-    """One of `CASES`, in a process that is a host; its outcome. Raises OSError when it fails."""
+def run_on_hosts(case: str, folder: Path, report: Callable[[str], None]) -> FaultOutcome:
+    """Run one of `CASES` on its own host and return its outcome.
+
+    `report` receives the lines that the host prints. Raises OSError when the host fails.
+    """
     folder.mkdir(parents=True)
-    command = [sys.executable, '-m', __spec__.name, case, str(folder)]
-    host = subprocess.Popen(
-        ['unshare', '--net', '--mount', *command], stdout=subprocess.PIPE, text=True
-    )
+    host = subprocess.Popen(host_command(case, folder), stdout=subprocess.PIPE, text=True)
     assert host.stdout is not None
     try:
         for line in host.stdout:
@@ -64,58 +65,77 @@ def run_on_hosts(case: str, folder: Path, report: Callable[[str], None]) -> Outc
         host.wait()
     finally:
         host.send_signal(signal.SIGTERM)
-    result = folder / _RESULT
-    if not result.exists():
+    if not (folder / _RESULT).exists():
         raise OSError(f'{case}: the host ended with exit code {host.returncode}, logs in {folder}')
-    values = json.loads(result.read_text())
-    return Outcome(**{**values, 'lost': tuple(values['lost'])})
+    return read_outcome(folder)
 
 
-def _network_cut(folder: Path) -> Outcome:
+def host_command(case: str, folder: Path) -> list[str]:
+    """Return the command line that runs a case in namespaces of its own."""
+    command = [sys.executable, '-m', 'ja_diagnostics.faults.hosts', case, str(folder)]
+    return ['unshare', '--net', '--mount', *command]
+
+
+def write_outcome(outcome: FaultOutcome, folder: Path) -> None:
+    """Write an outcome into a folder, for `read_outcome`."""
+    (folder / _RESULT).write_text(json.dumps(asdict(outcome)))
+
+
+def read_outcome(folder: Path) -> FaultOutcome:
+    """Read the outcome that a host has written into a folder."""
+    values = json.loads((folder / _RESULT).read_text())
+    return FaultOutcome(**{**values, 'lost': tuple(values['lost'])})
+
+
+def place_on_host(graph: Sequence[NodeSpec], executable: str, host: int) -> list[NodeSpec]:
+    """Return the graph with one node on another host, which a process id identifies."""
+    return [
+        _FarNode(**{**vars(spec), 'host': host}) if spec.executable == executable else spec
+        for spec in graph
+    ]
+
+
+def _network_cut(folder: Path) -> FaultOutcome:
     with _far_host() as host:
-        # Safe here: no link leads out of these two hosts.
+        # This is safe: no link leads out of these two hosts.
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SUBNET'
 
         def place(graph: list[NodeSpec]) -> list[NodeSpec]:
-            return [
-                _FarNode(**{**vars(spec), 'host': host})
-                if spec.thing == 'learning_module' else spec
-                for spec in graph
-            ]  # fmt: skip
+            return place_on_host(graph, 'learning_module', host)
 
-        run = FaultRun(folder, _say, place)
+        run = FaultRun(folder, _report, place)
         cut = Fault(
             'network to the learner cut',
             lambda _: _ip('link set near down'),
             lambda _: _ip('link set near up'),
         )
-        return _one(run, cut)
+        return _run_fault(run, cut)
 
 
-def _full_of_dead_segments(folder: Path) -> Outcome:
+def _full_of_dead_segments(folder: Path) -> FaultOutcome:
     subprocess.run(['mount', '-o', f'remount,size={_FULL_BYTES}', '/dev/shm'], check=True)
     while shutil.disk_usage('/dev/shm').free > _SEGMENT_BYTES:
         subprocess.run([sys.executable, '-c', _DIES], check=False)
-    run = FaultRun(folder, _say)
+    run = FaultRun(folder, _report)
     (killed,) = [f for f in run.faults() if f.name == 'salient_feature_detector killed -9']
-    return _one(run, replace(killed, name=f'{killed.name}, /dev/shm full of dead segments'))
+    return _run_fault(run, replace(killed, name=f'{killed.name}, /dev/shm full of dead segments'))
 
 
 CASES = {'network': _network_cut, 'segments': _full_of_dead_segments}
 
 
-def _one(run: FaultRun, fault: Fault) -> Outcome:
+def _run_fault(run: FaultRun, fault: Fault) -> FaultOutcome:
     run.run([fault])
     return run.outcomes[0]
 
 
 @contextmanager
 def _far_host() -> Iterator[int]:
-    """Another host at the end of a wire; the process id that its namespaces are known by."""
-    # It waits for the end of its input, and so does not outlive us.
-    holds = 'mount -t tmpfs tmpfs /dev/shm && ip link set lo up && echo ready && cat'
+    """Make a second host at the end of a virtual cable; yield the process id of its namespaces."""
+    # It waits for the end of its input, so that it ends with this process.
+    script = 'mount -t tmpfs tmpfs /dev/shm && ip link set lo up && echo ready && cat'
     far = subprocess.Popen(
-        ['unshare', '--net', '--mount', 'sh', '-c', holds],
+        ['unshare', '--net', '--mount', 'sh', '-c', script],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
     )  # fmt: skip
     assert far.stdout is not None
@@ -124,9 +144,9 @@ def _far_host() -> Iterator[int]:
         _ip(f'link add near type veth peer name far netns {far.pid}')
         _ip(f'address add {_NEAR} dev near')
         _ip('link set near up')
-        there = ['nsenter', f'--target={far.pid}', '--net', 'ip']
+        far_ip = ['nsenter', f'--target={far.pid}', '--net', 'ip']
         for order in (f'address add {_FAR} dev far', 'link set far up'):
-            subprocess.run([*there, *order.split()], check=True)
+            subprocess.run([*far_ip, *order.split()], check=True)
         yield far.pid
     finally:
         far.communicate()
@@ -136,18 +156,18 @@ def _ip(order: str) -> None:
     subprocess.run(['ip', *order.split()], check=True)
 
 
-def _say(line: str) -> None:
+def _report(line: str) -> None:
     print(line, flush=True)
 
 
 def main() -> None:
-    """Be the near host: the namespaces are there already, and empty."""
+    """Run a case inside the near host, whose namespaces exist already and are empty."""
     case, folder = sys.argv[1], Path(sys.argv[2])
     subprocess.run(['mount', '-t', 'tmpfs', 'tmpfs', '/dev/shm'], check=True)
     _ip('link set lo up')
     apply_ros_defaults()
     outcome = CASES[case](folder)
-    (folder / _RESULT).write_text(json.dumps(asdict(outcome)))
+    write_outcome(outcome, folder)
 
 
 if __name__ == '__main__':

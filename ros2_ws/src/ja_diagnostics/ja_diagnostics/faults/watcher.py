@@ -1,4 +1,4 @@
-"""Watches the running graph: when the head is told to move, and when the gate decides."""
+"""A node that watches the running graph: the head's commands, and the gate's decisions."""
 
 import time
 from typing import Any
@@ -15,7 +15,7 @@ _MOVED_RAD = 1e-4
 
 
 class Watcher(GraphNode):
-    """Times are of the steady clock [s], at this one listener."""
+    """Records when commands move the head, and when the gate decides; steady-clock times [s]."""
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('fault_watcher', **node_kwargs)
@@ -31,8 +31,8 @@ class Watcher(GraphNode):
         self.subscribe(GATE_STATUS, self._on_status)
         self.subscribe(DIAGNOSTICS, self._on_diagnostics)
 
-    def watch_pauses(self) -> None:
-        """From now on: the longest time without a decision, and when the next decision comes."""
+    def restart_pauses(self) -> None:
+        """Reset the longest time without a decision, and wait for the next decision."""
         self.longest_pause_s = 0.0
         self.resumed_s = None
 

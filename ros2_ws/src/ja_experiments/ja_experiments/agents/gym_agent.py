@@ -41,7 +41,7 @@ class GymAgent:
         posture = Posture(self._stamp_ns, observation['posture'].astype(float), np.zeros(2))
         image = observation['image']
         camera = CameraModel(image.shape[1], image.shape[0], *info['camera'])
-        percept = self._detector.look(image, self._stamp_ns, camera, posture)
+        percept = self._detector.detect(image, self._stamp_ns, camera, posture)
         proposal, _ = self._online_learner.live(percept.detections, percept.face_image, posture)
         if proposal.delta is not None and self._rng.random() < self.p_lm:
             return proposal.delta

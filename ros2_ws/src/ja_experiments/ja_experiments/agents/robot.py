@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ja_common.core.detection import Detection, caregiver_face, most_salient, objects
 from ja_common.core.posture import Posture
-from ja_control.core.attention_cycle import AttentionCycle, Decision, Percept
+from ja_control.core.attention_cycle import AttentionCycle, CycleInput, Decision
 from ja_control.core.gating import Gating
 from ja_control.core.joint_limits import JointLimits
 from ja_control.core.visual_feedback import visual_feedback
@@ -132,7 +132,7 @@ class Robot:
     ) -> Step:
         """One image, as detections and the picture of the attended `face`, uint8 (30, 25)."""
         proposal, fixation = self._online_learner.live(detections, face, posture)
-        percept = Percept(
+        percept = CycleInput(
             posture,
             face_delta=self._feedback(caregiver_face(detections)),
             vf_delta=self._feedback(most_salient(detections)),

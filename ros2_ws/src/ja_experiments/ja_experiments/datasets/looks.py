@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ja_common.core.cache import cache_folder
 from ja_common.core.detection import caregiver_face
 from ja_common.core.geometry import directions_of_rays
 from ja_control.core.attention_cycle import Phase
@@ -62,12 +63,6 @@ class Looks:
 
     def __getitem__(self, chosen: slice) -> Looks:
         return Looks(*(getattr(self, field.name)[chosen] for field in fields(self)))
-
-
-def cache_folder() -> Path:
-    """Where looks are kept: $JA_CACHE, or joint-attention in the user's cache folder."""
-    home = os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache'
-    return Path(os.environ.get('JA_CACHE') or Path(home) / 'joint-attention')
 
 
 def load_looks(

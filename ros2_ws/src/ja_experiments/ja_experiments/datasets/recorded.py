@@ -13,7 +13,7 @@ from ja_common.core.config import ConfigError
 from ja_experiments.datasets.looks import POOL, Looks
 from ja_experiments.paper.experiment import Materials
 from ja_learning.core.trial import FACE_SHAPE
-from ja_recording.core.dataset import Sample, read_dataset
+from ja_recording.core.dataset import TrialSample, read_dataset
 from ja_sim.core.scene import load_scene
 from ja_sim.core.specs import ObjectsSpec
 
@@ -50,7 +50,7 @@ def recorded_materials(folder: Path, pool: int, scene: str) -> Materials:
     return Materials.of(looks, places_around(looks, load_scene(scene).objects), origin, pool)
 
 
-def looks_of(samples: Sequence[Sample]) -> Looks:
+def looks_of(samples: Sequence[TrialSample]) -> Looks:
     """The data sets of the paper's experiment: faces, and where the thing was that she meant."""
     return Looks(
         np.array([sample.lesson.face for sample in samples]).reshape(-1, *FACE_SHAPE),

@@ -12,7 +12,7 @@ from ja_common.core.posture import Posture
 from ja_experiments.agents.robot import Robot, Step
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.detector import Percept, SalientFeatureDetector
-from ja_sim.core.world import JointAttentionWorld, Truth
+from ja_sim.core.world import JointAttentionWorld, WorldTruth
 
 IMAGE_PERIOD_S = 0.1
 DWELL_S = 0.5
@@ -20,7 +20,7 @@ DWELL_S = 0.5
 
 
 @dataclass(frozen=True)
-class Sight:
+class RenderedStep:
     """One image, and what was made of it. `truth` is for whoever scores or draws, not to learn."""
 
     image: NDArray[np.uint8]
@@ -28,7 +28,7 @@ class Sight:
     percept: Percept
     posture: Posture
     step: Step
-    truth: Truth
+    truth: WorldTruth
 
 
 class RenderedTask:
@@ -38,7 +38,7 @@ class RenderedTask:
         self._world, self._robot = world, robot
         self._detector = SalientFeatureDetector(BlazeFace())
 
-    def advance(self) -> Sight:
+    def advance(self) -> RenderedStep:
         """Let the head follow the last command, take a picture, and act on it."""
         self._world.step(IMAGE_PERIOD_S)
         seen, joints, truth = self._world.observe(), self._world.joint_state(), self._world.truth()
@@ -46,7 +46,7 @@ class RenderedTask:
         camera = CameraModel(
             seen.intrinsics.width, seen.intrinsics.height, seen.fx, seen.fy, seen.cx, seen.cy
         )
-        percept = self._detector.look(seen.image, seen.stamp_ns, camera, posture)
+        percept = self._detector.detect(seen.image, seen.stamp_ns, camera, posture)
         step = self._robot.step(percept.detections, percept.face_image, posture)
         self._world.command(step.command)
-        return Sight(seen.image, camera, percept, posture, step, truth)
+        return RenderedStep(seen.image, camera, percept, posture, step, truth)

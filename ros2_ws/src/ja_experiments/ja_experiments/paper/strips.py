@@ -19,7 +19,7 @@ from ja_control.core.attention_cycle import Phase
 from ja_experiments.agents.robot import Robot
 from ja_experiments.config import ExperimentConfig
 from ja_experiments.datasets.looks import IMAGE_SIZE, POOL
-from ja_experiments.datasets.rendered import DWELL_S, RenderedTask, Sight
+from ja_experiments.datasets.rendered import DWELL_S, RenderedStep, RenderedTask
 from ja_experiments.paper.experiment import LEARNER_ALONE
 from ja_experiments.paper.figures import BLUE, ORANGE, new_figure
 from ja_learning.core.network import ThreeLayerNetwork
@@ -34,7 +34,7 @@ class Episode:
     `success`: None when nothing was fixated and the trial was given up.
     """
 
-    sights: list[Sight]
+    sights: list[RenderedStep]
     success: bool | None
 
     @property
@@ -112,7 +112,7 @@ def _next_episode(task: RenderedTask) -> Episode | None:
     return Episode(sights, bool(nearest == sight.truth.attended))
 
 
-def _shifting(sight: Sight) -> bool:
+def _shifting(sight: RenderedStep) -> bool:
     return sight.step.decision.phase is Phase.SHIFT
 
 
@@ -143,7 +143,9 @@ def image_strips(episodes: list[Episode], config: ExperimentConfig) -> Figure:
     return figure
 
 
-def _draw(axes: Axes, sight: Sight, face: np.ndarray | None, config: ExperimentConfig) -> None:
+def _draw(
+    axes: Axes, sight: RenderedStep, face: np.ndarray | None, config: ExperimentConfig
+) -> None:
     height, width = sight.image.shape[:2]
     axes.imshow(sight.image)
     axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
@@ -160,7 +162,9 @@ def _draw(axes: Axes, sight: Sight, face: np.ndarray | None, config: ExperimentC
         _draw_face(axes, sight, face, config)
 
 
-def _draw_face(axes: Axes, sight: Sight, face: np.ndarray, config: ExperimentConfig) -> None:
+def _draw_face(
+    axes: Axes, sight: RenderedStep, face: np.ndarray, config: ExperimentConfig
+) -> None:
     """The network's input in the corner, and its output as a line from the middle of it."""
     rows, columns = face.shape
     scale = 0.36 * sight.image.shape[0] / rows

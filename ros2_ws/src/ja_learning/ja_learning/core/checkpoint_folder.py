@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ja_common.core.config import ConfigError, parameter
+from ja_common.core.config import ConfigError, Configuration, parameter
 from ja_learning.core.checkpoint import load_checkpoint, save_checkpoint
 from ja_learning.core.learner import Learner
 
@@ -18,7 +18,7 @@ _NAME = re.compile(r'(?P<kind>\w+)-(?P<number>\d{6,})\.npz')
 
 
 @dataclass(frozen=True)
-class CheckpointConfig:
+class CheckpointConfig(Configuration):
     """Where and when a learner is saved."""
 
     checkpoint_folder: str = parameter(

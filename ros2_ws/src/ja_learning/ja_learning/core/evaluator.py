@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.core.detection import Detection, Kind, objects
 from ja_common.core.fixation import WIDTH_SIXTH, nearest_to_centre
 from ja_common.core.geometry import directions_of_rays
@@ -18,7 +18,7 @@ from ja_learning.core.trial import same_posture
 
 
 @dataclass(frozen=True)
-class EvaluatorConfig:
+class EvaluatorConfig(Configuration):
     """When an object counts as fixated."""
 
     d_th_rad: float = parameter(

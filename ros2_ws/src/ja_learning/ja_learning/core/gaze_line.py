@@ -18,7 +18,6 @@ anew, for half of the members from nothing.
 """
 
 import copy
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,9 +25,9 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import nn
 
-from ja_common.core.config import parameter
 from ja_learning.core.evidence import ChangeAlarm, Evidence
 from ja_learning.core.gaze_line_belief import GazeLineBelief
+from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_learning.core.gaze_line_network import (
     ANGLE_SCALE_RAD,
     GazeLineNetwork,
@@ -51,35 +50,6 @@ _COMPARED_EVERY_TRIALS = 10
 _BEATEN_BY_NATS = 15.0
 _CLEAR_NATS = 10.0
 _WRONG_NATS = 8.0
-
-
-@dataclass(frozen=True)
-class GazeLineConfig:
-    """How the fast learner learns."""
-
-    members: int = parameter(6, 'networks that learn side by side', low=1, high=64)
-    replay_steps: int = parameter(4, 'gradient steps a trial', low=1, high=1000)
-    replay_batch: int = parameter(32, 'trials a gradient step', low=1, high=4096)
-    replay_memory: int = parameter(5000, 'trials kept for replay', low=1, high=100000)
-    step_size: float = parameter(0.003, 'step size of AdamW', low=1e-6, high=1.0)
-    weight_decay: float = parameter(
-        0.5, 'decay of the weights that code a face, as in AdamW', low=0.0, high=100.0
-    )
-    channels: int = parameter(8, 'channels of the first convolution', low=1, high=256)
-    none_was_meant: float = parameter(
-        0.05, 'prior probability that none of the candidates was meant', low=1e-4, high=0.9
-    )
-    top_down: bool = parameter(
-        True,
-        'propose the most probable of the objects that were seen; else always the best guess on '
-        'the line of gaze, whatever stands there',
-    )
-    plausible_within_nats: float = parameter(
-        4.5,
-        'a seen object is proposed when its log density is this near to that of the best guess; '
-        'else the head goes and looks there',
-        low=0.0, high=100.0,
-    )  # fmt: skip
 
 
 class GazeLineLearner:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_learning.core.trial import same_posture
 
 AT_A_VIEW_RAD = 0.05
@@ -18,7 +18,7 @@ AT_A_VIEW_RAD = 0.05
 
 
 @dataclass(frozen=True)
-class LookAroundConfig:
+class LookAroundConfig(Configuration):
     """When to glance, and where to."""
 
     look_around: str = parameter(

@@ -42,8 +42,8 @@ class BlazeFace:
         self._anchors = _anchor_centres()
         self._least_logit = float(np.log(least_score / (1 - least_score)))
 
-    def find(self, image: NDArray[np.uint8], square: Box) -> list[Face]:
-        """See ``FaceFinder.find``."""
+    def find_faces(self, image: NDArray[np.uint8], square: Box) -> list[Face]:
+        """See ``FaceFinder.find_faces``."""
         scale = _INPUT / square.width
         look = cut_square(image, square, _INPUT)
         blob = cv2.dnn.blobFromImage(look, 1 / 127.5, mean=(127.5, 127.5, 127.5))

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ja_common.core.camera_model import CameraModel
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.core.detection import Detection, Kind, most_salient
 from ja_common.core.fixation import WIDTH_SIXTH, stands_in_centre
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_perception.core.box import Box
 from ja_perception.core.face_crop import FACE_COLUMNS, FACE_ROWS, crop_face
-from ja_perception.core.face_watch import FaceConfig, FaceWatch
+from ja_perception.core.face_tracking import FaceConfig, FaceTracker
 from ja_perception.core.faces import FaceFinder
 from ja_perception.core.features import FeatureConfig
 from ja_perception.core.grouping import GroupingConfig
@@ -23,7 +23,7 @@ from ja_perception.core.salient_objects import InterestConfig, SalientObjects
 
 
 @dataclass(frozen=True)
-class AttentionConfig:
+class AttentionConfig(Configuration):
     """When the face counts as attended, and how it is cut out for the learner."""
 
     d_th_rad: float = parameter(
@@ -81,17 +81,17 @@ class SalientFeatureDetector:
         self._finder = finder
         self._config = config or DetectorConfig()
         self._posture_known = False
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Start anew, as if nothing had been seen."""
         config = self._config
-        self._faces = FaceWatch(self._finder, config.faces)
+        self._faces = FaceTracker(self._finder, config.faces)
         self._objects = SalientObjects(
             config.interest, config.features, config.motion, config.grouping, config.tracking
         )
 
-    def look(
+    def detect(
         self,
         image: NDArray[np.uint8],
         stamp_ns: int,
@@ -107,13 +107,13 @@ class SalientFeatureDetector:
         if self._posture_known != (posture is not None):
             # Directions remembered without a posture mean nothing with one.
             self._posture_known = posture is not None
-            self.forget()
+            self.reset()
         position = np.zeros(2) if posture is None else posture.position
         grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
-        faces = self._faces.look(image, grey, camera, position, stamp_ns)
+        faces = self._faces.update(image, grey, camera, position, stamp_ns)
         rays = [face.ray(position) for face in faces]
         boxes = [face.box(camera, position) for face in faces]
-        objects = self._objects.find(
+        objects = self._objects.find_objects(
             image, stamp_ns, camera, posture, [_whole_head(box) for box in boxes]
         )
         attended = bool(faces) and self._attends(rays[0], posture)

@@ -29,7 +29,7 @@ class FaceFinder(Protocol):
     smallest_share: float
     """The smallest face found, as a share of the side of the square looked at."""
 
-    def find(self, image: NDArray[np.uint8], square: Box) -> list[Face]:
+    def find_faces(self, image: NDArray[np.uint8], square: Box) -> list[Face]:
         """Faces in ``square`` of an (H, W, 3) RGB image; the square may reach beyond it."""
         ...
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 
 Mask = NDArray[np.uint8]
 
@@ -19,7 +19,7 @@ _SPECK = np.ones((2, 2), np.uint8)
 
 
 @dataclass(frozen=True)
-class FeatureConfig:
+class FeatureConfig(Configuration):
     """What counts as a bright colour, an edge, a motion."""
 
     colour_saturation: float = parameter(

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_perception.core.box import Box, overlaps
 from ja_perception.core.features import ColourMap, Mask, without_specks
 from ja_perception.core.hue_families import HUES, ONE_HUE, hue_families
@@ -24,7 +24,7 @@ _SEPARATE_OVERLAP = 0.4
 
 
 @dataclass(frozen=True)
-class GroupingConfig:
+class GroupingConfig(Configuration):
     """Which regions are objects."""
 
     smallest_object_share: float = parameter(

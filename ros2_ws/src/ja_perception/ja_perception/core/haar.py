@@ -21,8 +21,8 @@ class HaarFaces:
     def __init__(self) -> None:
         self._cascade = cv2.CascadeClassifier(cv2.data.haarcascades + _CASCADE)
 
-    def find(self, image: NDArray[np.uint8], square: Box) -> list[Face]:
-        """See ``FaceFinder.find``. The score is 1 for a face found by 20 neighbours or more."""
+    def find_faces(self, image: NDArray[np.uint8], square: Box) -> list[Face]:
+        """See ``FaceFinder.find_faces``. Twenty neighbours or more give a score of 1."""
         look = cv2.cvtColor(cut_square(image, square, _LOOK_PX), cv2.COLOR_RGB2GRAY)
         boxes, neighbours = self._cascade.detectMultiScale2(
             look, scaleFactor=1.1, minNeighbors=_LEAST_NEIGHBOURS

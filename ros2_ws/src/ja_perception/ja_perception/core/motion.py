@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ja_common.core.camera_model import CameraModel
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.core.geometry import head_rotation
 from ja_common.core.posture import NS_PER_S, Posture
 from ja_perception.core.ego_motion import expected_image, rotation_homography
@@ -24,7 +24,7 @@ _MOST_PAST = 64
 
 
 @dataclass(frozen=True)
-class MotionConfig:
+class MotionConfig(Configuration):
     """Over what time, and up to which speed of the head, motion is judged."""
 
     motion_span_s: float = parameter(
@@ -60,7 +60,7 @@ class MotionDetector:
         self._features = features
         self._past: deque[_Past] = deque(maxlen=_MOST_PAST)
 
-    def moving(
+    def detect_motion(
         self, grey: Mask, stamp_ns: int, camera: CameraModel, posture: Posture | None
     ) -> Mask | None:
         """Motion map (H, W) of an (H, W) image; None where motion cannot be judged.

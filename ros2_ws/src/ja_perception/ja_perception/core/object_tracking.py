@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.core.posture import NS_PER_S
 
 
 @dataclass(frozen=True)
-class TrackingConfig:
+class TrackingConfig(Configuration):
     """When two sightings are of the same thing, and how firmly a target is held."""
 
     same_object_within_rad: float = parameter(
@@ -62,7 +62,7 @@ class ObjectTracker:
             ids.append(track.track_id)
         return ids
 
-    def held(self, ids: list[int], scores: list[float], stamp_ns: int) -> list[float]:
+    def apply_hysteresis(self, ids: list[int], scores: list[float], stamp_ns: int) -> list[float]:
         """Scores with the hysteresis: the present target's is raised while it stays in view."""
         raised = [
             score * (1 + self._config.hysteresis * (i == self._target_id))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ja_common.core.camera_model import CameraModel
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.core.detection import Detection, Kind
 from ja_common.core.fixation import WIDTH_SIXTH
 from ja_common.core.geometry import vectors_of_rays
@@ -30,7 +30,7 @@ _GAZING_AREA = math.pi * math.tan(WIDTH_SIXTH) ** 2
 
 
 @dataclass(frozen=True)
-class InterestConfig:
+class InterestConfig(Configuration):
     """The coefficients of Eq. 1. A feature of no interest is not computed, and counts as 0."""
 
     alpha_col: float = parameter(1.0, 'alpha 1 of Eq. 1: interest in bright colour', low=0.0)
@@ -67,11 +67,11 @@ class SalientObjects:
         self._tracker = ObjectTracker(tracking)
         self._motion = MotionDetector(motion, features)
         self.motion_judged = False
-        """Was motion told in the last image? See ``MotionDetector.moving``."""
+        """Was motion told in the last image? See ``MotionDetector.detect_motion``."""
         self.moving_share = 0.0
         """Share of the last image that moved."""
 
-    def find(
+    def find_objects(
         self,
         image: NDArray[np.uint8],
         stamp_ns: int,
@@ -104,7 +104,7 @@ class SalientObjects:
         rays = camera.rays(boxes[:, :2])
         position = np.zeros(2) if posture is None else posture.position
         ids = self._tracker.update(vectors_of_rays(position, rays), stamp_ns)
-        scores = self._tracker.held(ids, saliency.tolist(), stamp_ns)
+        scores = self._tracker.apply_hysteresis(ids, saliency.tolist(), stamp_ns)
         rows = zip(rays.tolist(), boxes.tolist(), scores, ids, features.tolist(), strict=True)
         objects = [
             Detection(Kind.OBJECT, x, y, u, v, width, height, score, track_id, f_col, f_edg, f_mot)
@@ -129,7 +129,7 @@ class SalientObjects:
         if interest.alpha_edg:
             edges = edge_map(grey, self._features)
         if interest.alpha_mot:
-            moving = self._motion.moving(grey, stamp_ns, camera, posture)
+            moving = self._motion.detect_motion(grey, stamp_ns, camera, posture)
         self.motion_judged = moving is not None
         moving = nothing if moving is None else moving
         self.moving_share = cv2.countNonZero(moving) / moving.size

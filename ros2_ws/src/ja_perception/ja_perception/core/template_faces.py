@@ -31,10 +31,10 @@ class TemplateFaces:
         self._least_score = least_score
         self._template: NDArray[np.uint8] | None = None
 
-    def find(self, image: NDArray[np.uint8], square: Box) -> list[Face]:
-        """See ``FaceFinder.find``."""
+    def find_faces(self, image: NDArray[np.uint8], square: Box) -> list[Face]:
+        """See ``FaceFinder.find_faces``."""
         if self._template is None:
-            taught = self._teacher.find(image, square)
+            taught = self._teacher.find_faces(image, square)
             # Its false alarms would be found for ever.
             taught = [face for face in taught if face.score >= _SURE]
             if taught:

@@ -1,6 +1,6 @@
 """A data set of trials in a folder: `trials.parquet`, `faces/*.png`, and its card, `README.md`.
 
-Whoever has the folder needs nothing of this project: any tool reads the table and the pictures.
+The folder needs nothing of this project: any tool reads the table and the pictures.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ja_common.core.config import ConfigError
 from ja_learning.core.trial import Trial, checked_face
 
 TABLE, FACES, CARD = 'trials.parquet', 'faces', 'README.md'
-_LICENCE_UNSTATED = 'not stated: ask whoever recorded it before you pass it on'
+_LICENCE_UNSTATED = 'not stated: ask the person who recorded it before you pass it on'
 _AXES = ('pan', 'tilt')
 _ANGLES = pyarrow.list_(pyarrow.float64())
 
@@ -36,56 +36,66 @@ COLUMNS: Mapping[str, tuple[pyarrow.DataType, str]] = {
     'face': (pyarrow.string(), 'picture of the face: 8 bits grey, 30 rows x 25 columns'),
     'face_pan_rad': (pyarrow.float64(), 'direction [rad] in which the face was seen'),
     'face_tilt_rad': (pyarrow.float64(), 'the same for tilt [rad]'),
-    'postures_pan_rad': (_ANGLES, 'where each shift began [rad], the look at her first'),
+    'postures_pan_rad': (
+        _ANGLES,
+        'where each shift began [rad]; first, the look at the caregiver',
+    ),
     'postures_tilt_rad': (_ANGLES, 'the same for tilt [rad]'),
     'candidates_pan_rad': (_ANGLES, 'directions [rad] of the objects seen in the trial'),
     'candidates_tilt_rad': (_ANGLES, 'the same for tilt [rad]'),
-    'seen_before_shift': (pyarrow.int64(), 'so many candidates were seen before the first shift'),
+    'seen_before_shift': (pyarrow.int64(), 'number of candidates seen before the first shift'),
     'fixation_pan_rad': (pyarrow.float64(), 'direction [rad] of the object fixated at the end'),
     'fixation_tilt_rad': (pyarrow.float64(), 'the same for tilt [rad]'),
-    'source': (pyarrow.string(), 'whose shift led there: VF (visual feedback) or LM (learner)'),
-    'meant_pan_rad': (pyarrow.float64(), 'direction [rad] of what she meant; simulation only'),
+    'source': (pyarrow.string(), 'module of the last shift: VF (visual feedback) or LM (learner)'),
+    'meant_pan_rad': (
+        pyarrow.float64(),
+        'direction [rad] of the attended object; simulation only',
+    ),
     'meant_tilt_rad': (pyarrow.float64(), 'the same for tilt [rad]'),
-    'joint_attention': (pyarrow.bool_(), 'was it fixated, and no other? simulation only'),
-    'label_pan_rad': (pyarrow.float64(), 'what she meant [rad] as a person judged; fill it in'),
+    'joint_attention': (pyarrow.bool_(), 'was the attended object fixated? simulation only'),
+    'label_pan_rad': (
+        pyarrow.float64(),
+        'the attended direction [rad] as a person judged; fill it in',
+    ),
     'label_tilt_rad': (pyarrow.float64(), 'the same for tilt [rad]'),
 }
 """Type and meaning of every column, in their order."""
 
 
 @dataclass(frozen=True)
-class Sample:
-    """One trial: what the learner was taught, and what else is known.
+class TrialSample:
+    """One trial: what the learner learned from, and what else is known of it.
 
-    `meant`: (2,) [rad], from the truth of a simulation; `label`: (2,) [rad], as a person judged
-    it afterwards. Both None where nobody knows.
+    `attended_direction`: (2,) [rad] of the object that the caregiver attended to, from the truth
+    of a simulation; `label`: the same, (2,) [rad], as a person judged it afterwards. Both None
+    where it is not known.
     """
 
-    lesson: Trial
+    trial: Trial
     recording: str
     look_ns: int
     fixation_ns: int
     source: str | None = None
-    meant: NDArray[np.float64] | None = None
+    attended_direction: NDArray[np.float64] | None = None
     joint_attention: bool | None = None
     label: NDArray[np.float64] | None = None
 
     @property
     def target(self) -> tuple[str, NDArray[np.float64]]:
-        """The best that is known of what she meant, (2,) [rad], and how it is known."""
+        """Return how the attended direction is known, and its best estimate (2,) [rad]."""
         if self.label is not None:
             return 'label', self.label
-        if self.meant is not None:
-            return 'truth', self.meant
-        return 'fixation', self.lesson.led_to
+        if self.attended_direction is not None:
+            return 'truth', self.attended_direction
+        return 'fixation', self.trial.led_to
 
 
 def write_dataset(
-    folder: Path, samples: Iterable[Sample], options: Sequence[str], licence: str
+    folder: Path, samples: Iterable[TrialSample], options: Sequence[str], licence: str
 ) -> Path:
-    """Write a data set into a new folder; the path of its card.
+    """Write a data set into a new folder; return the path of its card.
 
-    For the card, `options`: what the trials were cut out with; `licence`: '' when nobody said.
+    For the card, `options`: ROS arguments of the export; `licence`: '' when it is not stated.
     Raises ConfigError when there is a data set already, or when there is nothing to write.
     """
     if (folder / TABLE).exists():
@@ -94,13 +104,13 @@ def write_dataset(
     rows, recordings, known = [], Counter[str](), Counter[str]()
     for number, sample in enumerate(samples):
         row = _row(number, sample)
-        if not cv2.imwrite(str(folder / row['face']), sample.lesson.face):
+        if not cv2.imwrite(str(folder / row['face']), sample.trial.face):
             raise OSError(f'{folder / row["face"]} cannot be written')
         rows.append(row)
         recordings[sample.recording] += 1
         known[sample.target[0]] += 1
     if not rows:
-        raise ConfigError('no trial ended in a fixation: there is nothing to make a data set of')
+        raise ConfigError('no trial ended in a fixation: there is nothing to write')
     card = _card(recordings, known, options, licence)
     (folder / CARD).write_text(card, encoding='utf-8')
     schema = pyarrow.schema([(name, kind) for name, (kind, _) in COLUMNS.items()])
@@ -108,8 +118,11 @@ def write_dataset(
     return folder / CARD
 
 
-def read_dataset(folder: Path) -> list[Sample]:
-    """The trials of a data set. Raises ConfigError when it is none, or is damaged."""
+def read_dataset(folder: Path) -> list[TrialSample]:
+    """Return the trials of a data set.
+
+    Raises ConfigError when the folder holds no data set, or a damaged one.
+    """
     try:
         rows = pyarrow.parquet.read_table(folder / TABLE).to_pylist()
     except FileNotFoundError:
@@ -122,37 +135,37 @@ def read_dataset(folder: Path) -> list[Sample]:
     return [_sample(folder, row) for row in rows]
 
 
-def _row(number: int, sample: Sample) -> dict[str, Any]:
-    lesson = sample.lesson
+def _row(number: int, sample: TrialSample) -> dict[str, Any]:
+    trial = sample.trial
     values = {
         'trial': number,
         'recording': sample.recording,
         'look_stamp_ns': sample.look_ns,
         'fixation_stamp_ns': sample.fixation_ns,
         'face': f'{FACES}/{number:06}.png',
-        'seen_before_shift': lesson.seen_before_shift,
+        'seen_before_shift': trial.seen_before_shift,
         'source': sample.source,
         'joint_attention': sample.joint_attention,
     }
     for name in ('postures', 'candidates'):
-        pan, tilt = getattr(lesson, name).T.tolist()
+        pan, tilt = getattr(trial, name).T.tolist()
         values |= {f'{name}_pan_rad': pan, f'{name}_tilt_rad': tilt}
     for name, direction in (
-        ('face', lesson.face_at), ('fixation', lesson.fixation),
-        ('meant', sample.meant), ('label', sample.label),
+        ('face', trial.face_at), ('fixation', trial.fixation),
+        ('meant', sample.attended_direction), ('label', sample.label),
     ):  # fmt: skip
         pan, tilt = (None, None) if direction is None else map(float, direction)
         values |= {f'{name}_pan_rad': pan, f'{name}_tilt_rad': tilt}
     return values
 
 
-def _sample(folder: Path, row: Mapping[str, Any]) -> Sample:
+def _sample(folder: Path, row: Mapping[str, Any]) -> TrialSample:
     picture = cv2.imread(str(folder / row['face']), cv2.IMREAD_UNCHANGED)
     try:
         face = checked_face(np.asarray(picture))
     except ValueError as error:
         raise ConfigError(f'{folder / row["face"]}: {error}') from None
-    lesson = Trial(
+    trial = Trial(
         face,
         np.array([row['face_pan_rad'], row['face_tilt_rad']], float),
         _pairs(row, 'postures'),
@@ -160,8 +173,8 @@ def _sample(folder: Path, row: Mapping[str, Any]) -> Sample:
         _pairs(row, 'candidates'),
         row['seen_before_shift'],
     )
-    return Sample(
-        lesson,
+    return TrialSample(
+        trial,
         row['recording'],
         row['look_stamp_ns'],
         row['fixation_stamp_ns'],
@@ -178,7 +191,7 @@ def _pairs(row: Mapping[str, Any], name: str) -> NDArray[np.float64]:
 
 def _direction(row: Mapping[str, Any], name: str) -> NDArray[np.float64] | None:
     direction = np.array([row[f'{name}_{axis}_rad'] for axis in _AXES], float)
-    # Not a number is how some tools write what is not there.
+    # Some tools write NaN for a missing value.
     return direction if np.isfinite(direction).all() else None
 
 

@@ -1,4 +1,4 @@
-"""Reads recordings: MCAP files of any ROS 2 recorder, unfinished ones as far as they go."""
+"""Read recordings: MCAP files of any ROS 2 recorder, unfinished files included."""
 
 import io
 import struct
@@ -22,7 +22,7 @@ _CUT_SHORT = (McapError, ZstdError, struct.error, EOFError, ValueError)
 
 @dataclass(frozen=True)
 class RecordedTopic:
-    """A topic of a recording; `offered_qos` is rosbag2's YAML, '' where none was kept."""
+    """A topic of a recording; `offered_qos` is rosbag2's YAML, '' if it is not in the file."""
 
     name: str
     type_name: str
@@ -31,7 +31,7 @@ class RecordedTopic:
 
 @dataclass(frozen=True)
 class RecordedMessage:
-    """One message: CDR bytes, and when it was said (wall clock, ns)."""
+    """One message: CDR bytes, and its time of publication (wall clock) [ns]."""
 
     topic: RecordedTopic
     stamp_ns: int
@@ -41,14 +41,17 @@ class RecordedMessage:
 class Recording:
     """A file, or a folder of files in the order of their numbers.
 
-    Raises ConfigError when there is none, or when one is no MCAP file of ROS 2 messages.
+    `unfinished`: files whose recorder ended without closing them. Raises ConfigError when there
+    is no file, or when one is not an MCAP file of ROS 2 messages.
     """
 
     def __init__(self, path: Path) -> None:
-        self._paths = sorted(path.glob('*.mcap'), key=_number) if path.is_dir() else [path]
+        self._paths = (
+            sorted(path.glob('*.mcap'), key=_order_in_folder) if path.is_dir() else [path]
+        )
         if not self._paths or not all(each.is_file() for each in self._paths):
             raise ConfigError(f'{path}: no recording (.mcap) there')
-        files = [_File(each) for each in self._paths]
+        files = [_McapFile(each) for each in self._paths]
         self.unfinished = [file.path for file in files if file.unfinished]
         self.topics: dict[str, RecordedTopic] = {}
         for file in files:
@@ -58,18 +61,18 @@ class Recording:
         self.last_ns = max((span[1] for span in spans), default=0)
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RecordedMessage]:
-        """The messages of some topics (None: all) in the order they were said."""
+        """Yield the messages of some topics (None: all) in the order of publication."""
         for path in self._paths:
-            yield from _File(path).messages(topics)
+            yield from _McapFile(path).messages(topics)
 
 
 def warn_of_unfinished(recording: Recording) -> None:
-    """Tell, on the terminal, which files end where their recorder died."""
+    """Print, on stderr, which files their recorder did not close."""
     for path in recording.unfinished:
-        print(f'{path} was not ended: it is read as far as it goes', file=sys.stderr)
+        print(f'{path} was not closed: it is read up to its last whole message', file=sys.stderr)
 
 
-class _File:
+class _McapFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._summary = self._read_summary()
@@ -112,7 +115,7 @@ class _File:
             return None
 
     def _salvage(self) -> list[RecordedMessage]:
-        """All whole messages, in order. In memory: an unfinished file is one split at most."""
+        """Return all whole messages, in order, in memory: the file is one split at most."""
         schemas: dict[int, Schema] = {}
         topics: dict[int, RecordedTopic] = {}
         messages: list[RecordedMessage] = []
@@ -130,7 +133,9 @@ class _File:
                     messages.append(message)
         except _CUT_SHORT as error:
             if not messages:
-                raise ConfigError(f'{self.path}: nothing can be read of it: {error}') from None
+                raise ConfigError(
+                    f'{self.path}: no message can be read from it: {error}'
+                ) from None
         return sorted(messages, key=lambda message: message.stamp_ns)
 
 
@@ -141,6 +146,6 @@ def _topic(schema: Schema | None, channel: Channel) -> RecordedTopic:
     return RecordedTopic(channel.topic, schema.name, offered)
 
 
-def _number(path: Path) -> tuple[int, str]:
+def _order_in_folder(path: Path) -> tuple[int, str]:
     last = path.stem.rpartition('_')[2]
     return (int(last) if last.isdecimal() else 0, path.name)

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.core.geometry import head_rotation
 from ja_common.core.posture import NS_PER_S, Posture
 
@@ -16,7 +16,7 @@ _HEAD_FROM_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.
 
 
 @dataclass(frozen=True)
-class DigitalHeadConfig:
+class DigitalHeadConfig(Configuration):
     """The window, the wide camera and the servos."""
 
     view_width_px: int = parameter(320, 'width of the window', low=16, high=4096)
@@ -65,7 +65,9 @@ class DigitalHead:
             raise ValueError(f'a posture is two finite numbers (pan, tilt), not {posture!r}')
         self._target = target
 
-    def look(self, wide: NDArray[np.uint8], stamp_ns: int) -> tuple[NDArray[np.uint8], Posture]:
+    def render_view(
+        self, wide: NDArray[np.uint8], stamp_ns: int
+    ) -> tuple[NDArray[np.uint8], Posture]:
         """Let the servos run until ``stamp_ns``; the window's picture and the posture there.
 
         ``wide``: (H, W, 3) or (H, W) uint8. What lies beyond the wide picture is black.

@@ -15,15 +15,13 @@ from typing import Any, get_type_hints
 
 import yaml
 
-from ja_common.core.config import ConfigError, parameter
+from ja_common.core.config import ConfigError, Configuration, checked, parameter
 from ja_sim.core.specs import (
     HEAD_PRESETS,
     CaregiverSpec,
-    Checked,
     HeadSpec,
     ObjectsSpec,
     RoomSpec,
-    check_field,
 )
 
 
@@ -32,7 +30,7 @@ class SceneError(ConfigError):
 
 
 @dataclass(frozen=True)
-class Scene(Checked):
+class Scene(Configuration):
     """A whole world, ready for :class:`ja_sim.core.world.JointAttentionWorld`."""
 
     name: str = parameter('default', 'What reports call it')
@@ -95,7 +93,7 @@ class _Reader:
             values[key.value] = self._value(types[key.value], value, getattr(base, key.value))
             try:
                 if 'description' in known[key.value].metadata:
-                    check_field(known[key.value], values[key.value])
+                    checked(known[key.value], values[key.value])
             except ConfigError as error:
                 raise self._error(key, str(error)) from None
         try:

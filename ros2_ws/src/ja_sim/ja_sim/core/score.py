@@ -14,7 +14,7 @@ from ja_common.core.statistics import Rate
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TrialOutcome:
     """How one trial ended. Directions are (pan, tilt) [rad]; no fixation means it was given up."""
 
     trial: int
@@ -52,7 +52,7 @@ class Score:
         self._recent: deque[bool] = deque(maxlen=window)
         self._rates: dict[str, Rate] = {}
 
-    def see(self, truth: TruthAt, fixation: NDArray[np.float64] | None) -> Outcome | None:
+    def see(self, truth: TruthAt, fixation: NDArray[np.float64] | None) -> TrialOutcome | None:
         """One image: the truth and the fixation (2,) [rad] at its stamp; what just ended, if any.
 
         A trial ends when the next begins. What happens before the first look (trial 0) belongs to
@@ -75,8 +75,8 @@ class Score:
         """Rates by name: 'all', 'recent', 'in_view', 'out_of_view', and 'objects_N'."""
         return {'recent': Rate(sum(self._recent), len(self._recent)), **self._rates}
 
-    def _close(self, truth: TruthAt) -> Outcome:
-        outcome = Outcome(
+    def _close(self, truth: TruthAt) -> TrialOutcome:
+        outcome = TrialOutcome(
             truth.trial,
             truth.stamp_ns,
             len(truth.directions),

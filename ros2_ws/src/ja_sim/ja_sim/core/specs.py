@@ -6,41 +6,13 @@ people write them; everything computed from them is in radians.
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
-from ja_common.core.config import ConfigError, checked, parameter
-
-
-def _interval(default: tuple[float, float], description: str, low: float, high: float) -> Any:
-    return field(default=default, metadata={'description': description, 'bounds': (low, high)})
-
-
-class Checked:
-    """Refuses field values that do not fit, whether they come from Python or from a file."""
-
-    def __post_init__(self) -> None:
-        for item in dataclasses.fields(self):  # type: ignore[arg-type]
-            if 'description' in item.metadata:
-                check_field(item, getattr(self, item.name))
-
-
-def check_field(item: dataclasses.Field, value: Any) -> None:
-    """Raise ConfigError unless a value fits its field."""
-    if 'bounds' not in item.metadata:
-        checked(item, value)
-        return
-    low, high = item.metadata['bounds']
-    pair = isinstance(value, tuple) and len(value) == 2
-    if not pair or any(type(bound) not in (int, float) for bound in value):
-        raise ConfigError(f'{item.name} = {value!r} is not a pair [low, high] of numbers')
-    if not low <= value[0] <= value[1] <= high:
-        raise ConfigError(f'{item.name} = {list(value)} is not a rising pair in [{low}, {high}]')
+from ja_common.core.config import ConfigError, Configuration, interval_parameter, parameter
 
 
 @dataclass(frozen=True)
-class HeadSpec(Checked):
+class HeadSpec(Configuration):
     """The robot's head: servos, encoders and camera. The defaults are the *ideal* head."""
 
     pan_limit_deg: float = parameter(60.0, 'Largest pan to either side', low=1.0, high=170.0)
@@ -80,8 +52,8 @@ class HeadSpec(Checked):
         0.0, 'Standard deviation of a pixel in grey levels', low=0.0, high=50.0
     )
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def check_together(self) -> None:
+        """Raise ConfigError for a latency without a camera rate."""
         if self.camera_latency_s > 0.0 and self.camera_rate_hz == 0.0:
             raise ConfigError(
                 f'camera_latency_s = {self.camera_latency_s} needs a camera_rate_hz above 0'
@@ -108,14 +80,14 @@ HEAD_PRESETS = {
 
 
 @dataclass(frozen=True)
-class CaregiverSpec(Checked):
+class CaregiverSpec(Configuration):
     """Who she is, where she sits and how she behaves."""
 
     identity: str = parameter('any', "A name in the asset, or 'any': drawn at each reset")
     distance_m: float = parameter(1.2, 'From the robot to her face', low=0.6, high=4.0)
     pan_deg: float = parameter(0.0, 'Where her face is', low=-60.0, high=60.0)
     tilt_deg: float = parameter(0.0, 'Where her face is', low=-20.0, high=20.0)
-    head_share: tuple[float, float] = _interval(
+    head_share: tuple[float, float] = interval_parameter(
         (0.6, 0.9), 'Part of the gaze angle that her head takes, drawn per look', 0.0, 1.0
     )
     head_noise_deg: float = parameter(
@@ -153,14 +125,22 @@ class CaregiverSpec(Checked):
 
 
 @dataclass(frozen=True)
-class ObjectsSpec(Checked):
+class ObjectsSpec(Configuration):
     """The things on and above the table, seen from the robot's head."""
 
     count: int = parameter(5, 'How many', low=1, high=10)
-    pan_deg: tuple[float, float] = _interval((-40.0, 40.0), 'Where they may be', -90.0, 90.0)
-    tilt_deg: tuple[float, float] = _interval((-15.0, 15.0), 'Where they may be', -45.0, 45.0)
-    distance_m: tuple[float, float] = _interval((0.6, 1.0), 'How far they may be', 0.2, 3.0)
-    radius_m: tuple[float, float] = _interval((0.02, 0.035), 'How large they are', 0.005, 0.2)
+    pan_deg: tuple[float, float] = interval_parameter(
+        (-40.0, 40.0), 'Where they may be', -90.0, 90.0
+    )
+    tilt_deg: tuple[float, float] = interval_parameter(
+        (-15.0, 15.0), 'Where they may be', -45.0, 45.0
+    )
+    distance_m: tuple[float, float] = interval_parameter(
+        (0.6, 1.0), 'How far they may be', 0.2, 3.0
+    )
+    radius_m: tuple[float, float] = interval_parameter(
+        (0.02, 0.035), 'How large they are', 0.005, 0.2
+    )
     gap_to_face_deg: float = parameter(
         8.0, 'Least angle between an object and her face', low=0.0, high=40.0
     )
@@ -174,7 +154,7 @@ class ObjectsSpec(Checked):
 
 
 @dataclass(frozen=True)
-class RoomSpec(Checked):
+class RoomSpec(Configuration):
     """The room and its light."""
 
     furnished: bool = parameter(True, 'With furniture and clutter, or walls and table only')

@@ -34,7 +34,7 @@ START_NS = 1_000_000_000  # a stamp of zero means 'no time' in ROS
 
 
 @dataclass(frozen=True)
-class Truth:
+class WorldTruth:
     """What only the scorer may know, at one instant. Positions [m] in the base frame.
 
     ``attended`` is an index into ``object_ids`` (N,), ``positions`` (N, 3) and ``directions``
@@ -59,10 +59,10 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class _View:
+class _Exposure:
     """All that one exposure depends on, so that a late picture shows the world as it was."""
 
-    truth: Truth
+    truth: WorldTruth
     velocity: np.ndarray
     gaze: GazePose
     eyes_closed: bool
@@ -124,7 +124,7 @@ class JointAttentionWorld:
         self._blinking = Blinking(self.scene.caregiver.blink_rate_hz, blinks)
         self._attended, self._elsewhere, self._in_view = ROBOT, np.zeros(3), False
         self._turned_s = 0.0
-        self._frame_buffer: deque[_View] = deque([self._view()])
+        self._frame_buffer: deque[_Exposure] = deque([self._view()])
         self._observation: Observation | None = None
         self._sample = self._head.read_encoders(self._now_ns, self._encoder_rng)
 
@@ -195,12 +195,12 @@ class JointAttentionWorld:
         """The newest reading of the encoders."""
         return self._sample
 
-    def truth(self) -> Truth:
+    def truth(self) -> WorldTruth:
         """How things are now; for the scorer only."""
         positions = self._positions()
         look = self._behaviour.look
         face = self._caregiver.face_position(self._gaze.pose(self._time_s, self._target_now()))
-        return Truth(
+        return WorldTruth(
             stamp_ns=self._now_ns,
             trial=look.trial,
             attended=look.attended,
@@ -215,7 +215,7 @@ class JointAttentionWorld:
             posture=self._head.posture,
         )
 
-    def truth_at_exposure(self) -> Truth:
+    def truth_at_exposure(self) -> WorldTruth:
         """How things were when the picture was taken that `observe` gives; for the scorer only."""
         return self._frame_buffer[0].truth
 
@@ -299,8 +299,8 @@ class JointAttentionWorld:
         ray = rays_of_directions(self._head.posture, direction)
         return bool(np.all(np.abs(ray) < np.tan(view)))
 
-    def _view(self) -> _View:
-        return _View(
+    def _view(self) -> _Exposure:
+        return _Exposure(
             self.truth(),
             self._head.velocity,
             self._gaze.pose(self._time_s, self._target_now()),
@@ -309,7 +309,7 @@ class JointAttentionWorld:
             self._hand(),
         )
 
-    def _draw(self, view: _View) -> np.ndarray:
+    def _draw(self, view: _Exposure) -> np.ndarray:
         data = self._data
         self._caregiver.place(data, view.gaze, view.eyes_closed)
         self._caregiver.reach(data, view.hand)

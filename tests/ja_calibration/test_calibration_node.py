@@ -1,11 +1,11 @@
-"""The node of `./ja calibrate`: it begins where the head stands, is gentle, and stops."""
+"""The node of `./ja calibrate`: it starts where the head stands, turns gently, and stops."""
 
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from ja_calibration.rig import CalibrationRig
+from ja_calibration.calibration_node import CalibrationNode
 from ja_common.image_codec import encode_image
 from ja_common.topics import IMAGE, JOINT_COMMANDS, JOINT_STATES
 from node_bench import NodeBench
@@ -17,36 +17,36 @@ START = (0.3, -0.1)
 @pytest.fixture
 def bench(make_bench: Callable[..., NodeBench]) -> NodeBench:
     return make_bench(
-        CalibrationRig,
+        CalibrationNode,
         publishes=[JOINT_STATES, IMAGE],
         subscribes=[JOINT_COMMANDS],
         stall_error_rad=3.0,
     )
 
 
-def say_now(bench: NodeBench) -> None:
+def publish_now(bench: NodeBench) -> None:
     stamp_ns = bench.peer.get_clock().now().nanoseconds
     bench.publish(IMAGE, encode_image(BLANK, bench.peer.get_clock().now().to_msg(), 'eye'))
     bench.publish_posture(stamp_ns, *START)
 
 
 def commands(bench: NodeBench, count: int) -> np.ndarray:
-    """So many more commands of a head that is seen meanwhile, (count, 2) [rad]."""
+    """Return `count` more commands, (count, 2) [rad], while images and joint states come."""
     before = len(bench.messages(JOINT_COMMANDS))
 
     def enough() -> bool:
-        say_now(bench)
+        publish_now(bench)
         return len(bench.messages(JOINT_COMMANDS)) >= before + count
 
     bench.wait(enough)
     return np.array([list(m.position) for m in bench.messages(JOINT_COMMANDS)[before:]])
 
 
-def test_begins_where_the_head_stands_and_turns_gently(bench: NodeBench) -> None:
-    told = commands(bench, 60)
-    assert told[0] == pytest.approx(START, abs=0.001)
-    assert np.abs(told[-1] - START).max() > 0.02
-    steps = np.diff(told, axis=0)
+def test_starts_where_the_head_stands_and_turns_gently(bench: NodeBench) -> None:
+    positions = commands(bench, 60)
+    assert positions[0] == pytest.approx(START, abs=0.001)
+    assert np.abs(positions[-1] - START).max() > 0.02
+    steps = np.diff(positions, axis=0)
     assert np.abs(steps).max() <= 0.35 * 0.01 + 1e-9
     assert np.abs(np.diff(steps, axis=0)).max() <= 1.5 * 0.01**2 + 1e-9
 
@@ -56,30 +56,30 @@ def test_stopped_it_brakes_and_holds(bench: NodeBench) -> None:
     assert not bench.node.at_rest
     bench.node.stop()
     bench.wait(lambda: bench.node.at_rest)
-    told = commands(bench, 10)
-    assert np.ptp(told[-5:], axis=0) == pytest.approx(np.zeros(2))
+    positions = commands(bench, 10)
+    assert np.ptp(positions[-5:], axis=0) == pytest.approx(np.zeros(2))
 
 
-def test_two_do_not_lead_one_head(make_bench: Callable[..., NodeBench]) -> None:
-    bench = make_bench(CalibrationRig, publishes=[JOINT_STATES, IMAGE])
+def test_two_nodes_do_not_command_one_head(make_bench: Callable[..., NodeBench]) -> None:
+    bench = make_bench(CalibrationNode, publishes=[JOINT_STATES, IMAGE])
     bench.peer.create_publisher(
         JOINT_COMMANDS.type, JOINT_COMMANDS.name, JOINT_COMMANDS.publisher_qos
     )
     bench.wait(lambda: bench.node.count_publishers(JOINT_COMMANDS.name) == 2)
 
     def listen_and_speak() -> bool:
-        say_now(bench)
+        publish_now(bench)
         return False
 
-    with pytest.raises(ValueError, match='two cannot lead one head'):
+    with pytest.raises(ValueError, match='two nodes cannot command one head'):
         bench.wait(listen_and_speak)
 
 
 def test_a_start_near_the_limits_is_refused(make_bench: Callable[..., NodeBench]) -> None:
-    bench = make_bench(CalibrationRig, publishes=[JOINT_STATES, IMAGE], pan_max_rad=0.35)
+    bench = make_bench(CalibrationNode, publishes=[JOINT_STATES, IMAGE], pan_max_rad=0.35)
 
     def listen_and_speak() -> bool:
-        say_now(bench)
+        publish_now(bench)
         return False
 
     with pytest.raises(ValueError, match='within its limits'):

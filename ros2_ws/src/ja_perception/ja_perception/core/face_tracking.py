@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ja_common.core.camera_model import CameraModel
-from ja_common.core.config import parameter
+from ja_common.core.config import Configuration, parameter
 from ja_common.core.geometry import angle_between, directions_of_rays, rays_of_directions
 from ja_common.core.posture import NS_PER_S
 from ja_perception.core.box import Box
@@ -22,7 +22,7 @@ from ja_perception.core.face_crop import FACE_COLUMNS, FACE_ROWS, crop_face
 from ja_perception.core.faces import Face, FaceFinder, without_doubles
 
 # A look at a known face takes this many face widths, which is what the detectors are trained on.
-_LOOK_WIDTHS = 2.5
+_SEARCH_WIDTHS = 2.5
 # A look that would take more than this share of the picture takes the whole.
 _NEARLY_WHOLE = 0.6
 # Smaller faces hold too few pixels to be known for faces.
@@ -42,7 +42,7 @@ _UNCHANGED_L1 = 3 * FACE_ROWS * FACE_COLUMNS
 
 
 @dataclass(frozen=True)
-class FaceConfig:
+class FaceConfig(Configuration):
     """How faces are searched for and remembered."""
 
     new_face_score: float = parameter(
@@ -70,7 +70,7 @@ class FaceConfig:
     )
 
 
-class WatchedFace:
+class FaceTrack:
     """A face over time, steadied: the detector's box jitters, and jitter would look like gaze.
 
     The direction is averaged while the sightings stay within the detector's jitter, and follows
@@ -89,7 +89,7 @@ class WatchedFace:
         self._sizes = 0
         self._picture: NDArray[np.uint8] | None = None
 
-    def sight(self, direction: ArrayLike, size: ArrayLike, score: float, longest: int) -> None:
+    def update(self, direction: ArrayLike, size: ArrayLike, score: float, longest: int) -> None:
         """Take in a sighting: direction [rad] and box size (width, height) at unit focal length.
 
         ``longest``: sightings of a resting face over which its direction is averaged.
@@ -115,7 +115,7 @@ class WatchedFace:
         width, height = (self._size * (camera.fx, camera.fy)).tolist()
         return Box(u, v, width, height)
 
-    def remember(self, grey: NDArray[np.uint8], box: Box) -> None:
+    def store_picture(self, grey: NDArray[np.uint8], box: Box) -> None:
         """Keep its picture, cut from an (H, W) image, for ``is_unchanged``."""
         self._picture = crop_face(grey, box)
 
@@ -127,7 +127,7 @@ class WatchedFace:
 
 
 @dataclass(frozen=True)
-class _View:
+class _ImageView:
     """An image, also in grey, and how its pixels lie in space."""
 
     image: NDArray[np.uint8]
@@ -135,46 +135,46 @@ class _View:
     camera: CameraModel
     posture: NDArray[np.float64]
 
-    def box(self, face: WatchedFace) -> Box:
+    def box(self, face: FaceTrack) -> Box:
         return face.box(self.camera, self.posture)
 
-    def shows(self, face: WatchedFace) -> bool:
+    def shows(self, face: FaceTrack) -> bool:
         return self.camera.contains(self.camera.pixels(face.ray(self.posture)))
 
 
-class FaceWatch:
+class FaceTracker:
     """Finds faces in image after image with any ``FaceFinder``."""
 
     def __init__(self, finder: FaceFinder, config: FaceConfig) -> None:
         self._finder = finder
         self._config = config
-        self._faces: list[WatchedFace] = []
-        self._caregiver: WatchedFace | None = None
+        self._faces: list[FaceTrack] = []
+        self._caregiver: FaceTrack | None = None
         self._next_id = 0
         self._scan_place = -1
         self._until_scan = 0
         self._stamp_ns: int | None = None
 
-    def look(
+    def update(
         self,
         image: NDArray[np.uint8],
         grey: NDArray[np.uint8],
         camera: CameraModel,
         posture: NDArray[np.float64],
         stamp_ns: int,
-    ) -> list[WatchedFace]:
+    ) -> list[FaceTrack]:
         """The faces in view of an (H, W, 3) RGB image, (H, W) in grey; the caregiver's first.
 
         ``posture`` (pan, tilt) [rad] at the image's stamp. The caregiver is the largest face when
         none was known, and stays so until her face is forgotten.
         """
-        view = _View(image, grey, camera, posture)
+        view = _ImageView(image, grey, camera, posture)
         elapsed_s = self._elapsed(stamp_ns)
         expected = [face for face in self._faces if view.shows(face)]
         for face in expected:
             face.missed_s += elapsed_s
-        for sighting in self._find(view, expected):
-            self._sight(sighting, view, expected)
+        for sighting in self._find_faces(view, expected):
+            self._update_track(sighting, view, expected)
         self._forget(expected)
         present = [
             face
@@ -195,7 +195,7 @@ class FaceWatch:
             return 0.0
         return (stamp_ns - before) / NS_PER_S
 
-    def _find(self, view: _View, expected: list[WatchedFace]) -> list[Face]:
+    def _find_faces(self, view: _ImageView, expected: list[FaceTrack]) -> list[Face]:
         height, width = view.grey.shape
         whole = whole_square(width, height)
         squares: list[Box] = []
@@ -205,7 +205,7 @@ class FaceWatch:
             if caregiver.is_unchanged(view.grey, box):
                 caregiver.missed_s = 0.0
             else:
-                squares.append(look_at(box, whole))
+                squares.append(search_square(box, whole))
         if self._scan_is_due(expected, busy=bool(squares)):
             places = scan_squares(width, height, self._smallest_square(width))
             self._scan_place = (self._scan_place + 1) % len(places)
@@ -214,18 +214,18 @@ class FaceWatch:
         known = [view.box(face) for face in expected]
         found: list[Face] = []
         for square in squares:
-            for face in self._finder.find(view.image, square):
+            for face in self._finder.find_faces(view.image, square):
                 if any(face.box.overlap(box) > _SAME_OVERLAP for box in known):
                     found.append(face)
                 else:
-                    found += self._second_look(view.image, face, square, whole)
+                    found += self._confirm_new_face(view.image, face, square, whole)
         return without_doubles(found)
 
     def _smallest_square(self, width: int) -> float:
         smallest_px = max(self._config.smallest_face_share * width, _LEAST_FACE_PX)
         return smallest_px / self._finder.smallest_share
 
-    def _scan_is_due(self, expected: list[WatchedFace], busy: bool) -> bool:
+    def _scan_is_due(self, expected: list[FaceTrack], busy: bool) -> bool:
         """In every image while the caregiver is unknown or not in place, else every so many.
 
         A scan waits for an image in which she needs no look (``busy``), as many images again at
@@ -242,33 +242,33 @@ class FaceWatch:
             return True
         return False
 
-    def _second_look(
+    def _confirm_new_face(
         self, image: NDArray[np.uint8], face: Face, square: Box, whole: Box
     ) -> list[Face]:
         """A face seen for the first time must be seen again, framed as faces are at best."""
         least = self._config.new_face_score
         if face.score < least:
             return []
-        framed = look_at(face.box, whole)
-        again = [face] if framed == square else self._finder.find(image, framed)
+        framed = search_square(face.box, whole)
+        again = [face] if framed == square else self._finder.find_faces(image, framed)
         return [f for f in again if f.box.overlap(face.box) > _SAME_OVERLAP and f.score >= least]
 
-    def _sight(self, face: Face, view: _View, expected: list[WatchedFace]) -> None:
+    def _update_track(self, face: Face, view: _ImageView, expected: list[FaceTrack]) -> None:
         overlaps = [face.box.overlap(view.box(known)) for known in expected]
         if overlaps and max(overlaps) > _SAME_OVERLAP:
             track = expected[overlaps.index(max(overlaps))]
         else:
-            track = WatchedFace(self._next_id)
+            track = FaceTrack(self._next_id)
             self._next_id += 1
             self._faces.append(track)
         camera = view.camera
         ray = camera.rays((face.box.u, face.box.v))
         size = (face.box.width / camera.fx, face.box.height / camera.fy)
         direction = directions_of_rays(view.posture, ray)
-        track.sight(direction, size, face.score, self._config.face_averaging)
-        track.remember(view.grey, view.box(track))
+        track.update(direction, size, face.score, self._config.face_averaging)
+        track.store_picture(view.grey, view.box(track))
 
-    def _forget(self, expected: list[WatchedFace]) -> None:
+    def _forget(self, expected: list[FaceTrack]) -> None:
         gone = [face for face in expected if face.missed_s > self._config.forget_face_s]
         self._faces = [face for face in self._faces if face not in gone]
         if self._caregiver in gone:
@@ -281,9 +281,9 @@ def whole_square(width: int, height: int) -> Box:
     return Box((width - 1) / 2, (height - 1) / 2, side, side)
 
 
-def look_at(face: Box, whole: Box) -> Box:
+def search_square(face: Box, whole: Box) -> Box:
     """The square to search for a face that is expected in ``face``."""
-    side = _LOOK_WIDTHS * max(face.width, face.height)
+    side = _SEARCH_WIDTHS * max(face.width, face.height)
     return whole if side > _NEARLY_WHOLE * whole.width else Box(face.u, face.v, side, side)
 
 

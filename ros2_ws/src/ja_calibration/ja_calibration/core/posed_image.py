@@ -1,4 +1,4 @@
-"""Pictures with the posture that the encoders say; the same points in two of them."""
+"""Images with the measured posture, and points that are tracked from one image to another."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,25 +12,25 @@ _FOUND_AGAIN_PX = 0.5
 
 
 @dataclass(frozen=True)
-class View:
-    """A grey picture (H, W) uint8, its stamp, and the joints' angles (2,) [rad] at that stamp."""
+class PosedImage:
+    """A grey image (H, W) uint8, its stamp, and the joints' angles (2,) [rad] at that stamp."""
 
     grey: NDArray[np.uint8]
     stamp_ns: int
     angles: NDArray[np.float64]
 
 
-def mean_view(views: Sequence[View]) -> View:
-    """Of a head at rest: less noise in the picture, and in the encoders."""
-    grey = np.mean([view.grey for view in views], axis=0).round().astype(np.uint8)
-    angles = np.mean([view.angles for view in views], axis=0)
-    return View(grey, views[-1].stamp_ns, angles)
+def mean_image(images: Sequence[PosedImage]) -> PosedImage:
+    """Average images of a head at rest: less noise in the pixels and in the encoders."""
+    grey = np.mean([image.grey for image in images], axis=0).round().astype(np.uint8)
+    angles = np.mean([image.angles for image in images], axis=0)
+    return PosedImage(grey, images[-1].stamp_ns, angles)
 
 
-class Points:
-    """Points of one picture that can be found again in others.
+class TrackedPoints:
+    """Corners of one image that optical flow finds again in others.
 
-    Raises ValueError when the picture has too few: a blank wall, or the dark.
+    Raises ValueError when the image has too few: a blank wall, or the dark.
     """
 
     def __init__(self, grey: NDArray[np.uint8], at_least: int = 20) -> None:
@@ -40,7 +40,7 @@ class Points:
         if found is None or len(found) < at_least:
             count = 0 if found is None else len(found)
             raise ValueError(
-                f'only {count} points in the picture can be followed; {at_least} are needed: '
+                f'only {count} points in the image can be tracked; {at_least} are needed: '
                 'let the camera see a room with light and things in it'
             )
         self.pixels: NDArray[np.float32] = found[:, 0]
@@ -48,19 +48,20 @@ class Points:
     def find_in(
         self, grey: NDArray[np.uint8], guess: NDArray[np.float64] | None = None
     ) -> NDArray[np.float64]:
-        """Where the points are in another picture, (N, 2) [px]; NaN for those not found.
+        """Return where the points are in another image, (N, 2) [px]; NaN for those not found.
 
-        What is found must lead back to where it came from. `guess` (2,) [px]: how far all moved.
+        A point counts as found when the flow back ends where it started. `guess` (2,) [px]: the
+        motion of all points to start from.
         """
         start = self.pixels if guess is None else (self.pixels + guess).astype(np.float32)
-        there = self._follow(self._grey, grey, self.pixels, start)
-        back = self._follow(grey, self._grey, there, self.pixels)
+        there = self._flow(self._grey, grey, self.pixels, start)
+        back = self._flow(grey, self._grey, there, self.pixels)
         lost = np.hypot(*(back - self.pixels).T) > _FOUND_AGAIN_PX
         found = there.astype(float)
         found[lost | ~np.isfinite(back).all(axis=1)] = np.nan
         return found
 
-    def _follow(
+    def _flow(
         self,
         before: NDArray[np.uint8],
         after: NDArray[np.uint8],

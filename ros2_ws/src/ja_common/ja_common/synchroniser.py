@@ -1,0 +1,202 @@
+"""Calls a node with the messages of one stamp and the posture at that stamp, in stamp order."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+
+from ja_common.core.patient_queue import PatientQueue
+from ja_common.core.posture import Posture, PostureHistory, PostureJoin
+from ja_common.core.stamp_join import StampJoin
+from ja_common.core.stamp_ordered_dispatcher import StampOrderedDispatcher
+from ja_common.graph_node import GraphNode
+from ja_common.joint_codec import JointCodec
+from ja_common.time_codec import to_ns
+from ja_common.topics import JOINT_STATES, Topic
+
+_PATIENCE_CHECKED_EVERY_S = 0.1
+
+
+@dataclass(frozen=True)
+class StampedSet:
+    """The decoded messages of one stamp, by topic, and the posture at that stamp.
+
+    `header`: of the message that completed the set. `posture_or_none`: None where the node asked
+    for no posture, or where it stays unknown and the node asked to be called all the same.
+    """
+
+    header: Header
+    stamp_ns: int
+    values: Mapping[Topic, Any]
+    posture_or_none: Posture | None = None
+
+    def __getitem__(self, topic: Topic) -> Any:
+        """Return the decoded message of a topic. Raises KeyError where the set has none."""
+        return self.values[topic]
+
+    @property
+    def posture(self) -> Posture:
+        """Return the posture at the stamp. Raises ValueError where it is unknown."""
+        if self.posture_or_none is None:
+            raise ValueError(f'the posture at stamp {self.stamp_ns} is not known')
+        return self.posture_or_none
+
+
+Callback = Callable[[StampedSet], None]
+
+
+class Synchroniser:
+    """Subscribes for a node; a callback gets whole sets, once the posture at their stamp is known.
+
+    Sets pass three steps: their messages are joined by stamp (`StampJoin`), they wait until joint
+    states surround the stamp (`PostureJoin`, or `PatientQueue`), and where a node asks for several
+    sets of one stamp, they are dispatched in the order in which the node named them
+    (`StampOrderedDispatcher`). So every run calls a node in the same order, whatever the order
+    in which the messages arrive.
+
+    A set whose posture never becomes known is dropped, and the node's health reports it. With
+    `patience_s` [s] it is called all the same, without a posture, after that time: for a camera
+    that may stand still. `is_calibrated` then holds sets back as well, for as long.
+    """
+
+    def __init__(
+        self,
+        node: GraphNode,
+        joints: JointCodec | None = None,
+        *,
+        joints_expected_every_s: float = 2.0,
+        patience_s: float | None = None,
+        is_calibrated: Callable[[], bool] = lambda: True,
+    ) -> None:
+        """`joints`: decodes the joint states; None: the callbacks need no posture."""
+        self._node = node
+        self._joints = joints
+        self._is_calibrated = is_calibrated
+        self._history = PostureHistory()
+        self._strict: PostureJoin[tuple[Callback, StampedSet]] = PostureJoin(self._history)
+        self._patient: PatientQueue[tuple[Callback, StampedSet]] | None = None
+        self._joins: list[StampJoin] = []
+        self._callbacks: list[Callback] = []
+        self._dispatcher: StampOrderedDispatcher | None = None
+        if joints is not None:
+            node.subscribe(JOINT_STATES, self._on_joint_states, joints_expected_every_s)
+        if patience_s is not None:
+            self._patient = PatientQueue(self._history, patience_s)
+            # Steady time: this is for the case that the other messages do not come.
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            node.create_timer(_PATIENCE_CHECKED_EVERY_S, self.call_ready, clock=steady)
+
+    @property
+    def newest_posture(self) -> Posture | None:
+        """Return the latest measured posture: for holding the head, not for an image."""
+        return self._history.newest
+
+    @property
+    def waits_for_posture(self) -> bool:
+        """Return whether a set waits for the joint states of its time."""
+        return len(self._strict) + len(self._patient or ()) > 0
+
+    def missing_topics(self) -> frozenset[str]:
+        """Return the names of the topics that the newest incomplete set still lacks."""
+        return frozenset().union(*(join.missing() for join in self._joins))
+
+    def call_with(
+        self,
+        decoders: Mapping[Topic, Callable[[Any], Any]],
+        callback: Callback,
+        *,
+        also: Mapping[Topic, Callable[[Any], Any]] | None = None,
+        also_when: Callable[[Any], bool] = lambda _: False,
+        expected_every_s: float | None = 2.0,
+    ) -> None:
+        """Call `callback` with one message of each topic of a stamp, decoded by its decoder.
+
+        `also`: further topics that belong to the set of some stamps only: those where
+        `also_when` holds for the value of the first topic. `expected_every_s` [s]: silence of a
+        topic of `decoders` for longer is a warning. Sets that are asked for first are called
+        first. A decoder raises ValueError for a message that cannot be used.
+        """
+        index = len(self._callbacks)
+        self._callbacks.append(callback)
+        self._dispatcher = StampOrderedDispatcher([str(i) for i in range(index + 1)])
+        first, *_ = decoders
+        base = StampJoin([topic.name for topic in decoders])
+        whole = StampJoin([topic.name for topic in (*decoders, *(also or {}))])
+        self._joins.append(base)
+        topics = {topic.name: topic for topic in (*decoders, *(also or {}))}
+
+        def complete(message: Any, stamp_ns: int, found: Mapping[str, Any]) -> None:
+            values = {topics[name]: value for name, value in found.items()}
+            self._queue(index, StampedSet(message.header, stamp_ns, values))
+
+        def collect(topic: Topic, decode: Callable[[Any], Any], message: Any) -> None:
+            stamp_ns, value = to_ns(message.header.stamp), decode(message)
+            if topic in decoders:
+                found = base.collect_value(topic.name, stamp_ns, value)
+                if found is None:
+                    return
+                if not (also and also_when(found[first.name])):
+                    complete(message, stamp_ns, found)
+                    return
+            else:
+                found = {topic.name: value}
+            for name, each in found.items():
+                both = whole.collect_value(name, stamp_ns, each)
+                if both is not None:
+                    complete(message, stamp_ns, both)
+
+        for topic, decode in decoders.items():
+            self._node.subscribe(topic, partial(collect, topic, decode), expected_every_s)
+        for topic, decode in (also or {}).items():
+            self._node.subscribe(topic, partial(collect, topic, decode))
+
+    def _queue(self, index: int, found: StampedSet) -> None:
+        if self._joints is None:
+            self._dispatch(index, found)
+            return
+        item = (partial(self._dispatch, index), found)
+        if self._patient is None:
+            self._strict.queue_item(found.stamp_ns, item)
+        else:
+            self._patient.queue_item(found.stamp_ns, item, time.monotonic())
+        self.call_ready()
+
+    def _dispatch(self, index: int, found: StampedSet) -> None:
+        call = partial(self._callbacks[index], found)
+        if len(self._callbacks) == 1 or self._dispatcher is None:
+            call()
+        else:
+            self._dispatcher.queue_action(str(index), found.stamp_ns, call)
+
+    def call_ready(self) -> None:
+        """Call the sets whose waiting is over; for a node whose calibration has come."""
+        if self._patient is not None:
+            for (call, found), _, posture in self._patient.pop_ready(
+                self._is_calibrated(), time.monotonic()
+            ):
+                call(_with_posture(found, posture))
+            return
+        for (call, found), posture in self._strict.pop_ready():
+            if posture is None:
+                text = 'no joint state for the stamp of an image: skipped'
+                self._node.problem('posture', text)
+            else:
+                call(_with_posture(found, posture))
+
+    def _on_joint_states(self, message: JointState) -> None:
+        assert self._joints is not None
+        position = self._joints.decode_posture(message)
+        if position is None:
+            raise ValueError('the message names no joints')
+        velocity = self._joints.decode_velocity(message)
+        self._history.record_posture(to_ns(message.header.stamp), position, velocity)
+        self.call_ready()
+
+
+def _with_posture(found: StampedSet, posture: Posture | None) -> StampedSet:
+    return StampedSet(found.header, found.stamp_ns, found.values, posture)

@@ -1,0 +1,53 @@
+"""The learners by name. A learner's module, and torch or numba with it, loads when it is made."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, NamedTuple
+
+from ja_common.core.config import ConfigError, Configuration, parameter
+from ja_learning.core.gaze_line_config import GazeLineConfig
+from ja_learning.core.learner import Learner
+from ja_learning.core.network_config import NetworkConfig
+
+
+class LearnerEntry(NamedTuple):
+    """Where a learner's class is, `module:class`, and the configuration that it takes."""
+
+    learner: str
+    config: type[Configuration]
+
+
+LEARNERS: Mapping[str, LearnerEntry] = {
+    'paper': LearnerEntry('ja_learning.core.network:ThreeLayerNetwork', NetworkConfig),
+    'gaze_line': LearnerEntry('ja_learning.core.gaze_line:GazeLineLearner', GazeLineConfig),
+}
+"""Every learner, by its `kind`; the first is the default."""
+
+
+@dataclass(frozen=True)
+class LearnerChoice(Configuration):
+    """Which learner."""
+
+    learner: str = parameter(
+        next(iter(LEARNERS)),
+        "the paper's network, or the fast one of lines of gaze; a change starts untrained",
+        choices=tuple(LEARNERS),
+    )
+
+
+def make_learner(kind: str, seed: int, config: Configuration | None = None) -> Learner:
+    """Make an untrained learner of this kind; without `config`, with its defaults.
+
+    Raises ConfigError when there is no such learner, or the configuration is of another one.
+    """
+    if kind not in LEARNERS:
+        raise ConfigError(f'{kind!r} is not a learner: choose one of {", ".join(LEARNERS)}')
+    entry = LEARNERS[kind]
+    config = entry.config() if config is None else config
+    if not isinstance(config, entry.config):
+        wanted, found = entry.config.__name__, type(config).__name__
+        raise ConfigError(f'the learner {kind} takes a {wanted}, not a {found}')
+    module, _, name = entry.learner.partition(':')
+    make: Any = getattr(import_module(module), name)
+    return make(config, seed)

@@ -1,0 +1,118 @@
+"""A node is called with whole sets of one stamp, with the posture, in stamp order."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from ja_common.graph_node import GraphNode
+from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.synchroniser import StampedSet, Synchroniser
+from ja_common.topics import FACE_DELTA, FIXATION, JOINT_STATES, LM_DELTA, VF_DELTA
+from node_bench import NodeBench, joint_state
+
+MS = 1_000_000
+
+
+class Recorder(GraphNode):
+    """Records the sets that it is called with: which, stamp [ms], pan of the posture."""
+
+    patience_s: float | None = None
+
+    def __init__(self, **node_kwargs: Any) -> None:
+        super().__init__('recorder', **node_kwargs)
+        joints = JointCodec(self.configure(JointConfig))
+        self.calls: list[tuple[str, int, float | None]] = []
+        self.calibrated = True
+        self.synchroniser = Synchroniser(
+            self, joints, patience_s=self.patience_s, is_calibrated=lambda: self.calibrated
+        )
+        self.synchroniser.call_with(
+            {VF_DELTA: joints.decode, FACE_DELTA: joints.decode},
+            lambda found: self._record('pair', found),
+            also={LM_DELTA: joints.decode},
+            also_when=lambda delta: delta is not None,
+        )
+        self.synchroniser.call_with(
+            {FIXATION: joints.decode}, lambda found: self._record('single', found)
+        )
+
+    def _record(self, kind: str, found: StampedSet) -> None:
+        posture = found.posture_or_none
+        pan = None if posture is None else round(float(posture.position[0]), 6)
+        self.calls.append((kind, found.stamp_ns // MS, pan))
+
+
+class PatientRecorder(Recorder):
+    """Waits for a posture for a moment only."""
+
+    patience_s = 0.2
+
+
+SPOKEN = [JOINT_STATES, VF_DELTA, FACE_DELTA, LM_DELTA, FIXATION]
+
+
+@pytest.fixture
+def bench(make_bench: Callable[..., NodeBench]) -> NodeBench:
+    return make_bench(Recorder, publishes=SPOKEN)
+
+
+def send(bench: NodeBench, topic: Any, ms: int, *angles: float) -> None:
+    before = bench.received(topic)
+    bench.publish(topic, joint_state(ms * MS, *angles))
+    bench.wait(lambda: bench.received(topic) > before)
+
+
+def test_a_set_waits_for_all_its_topics_and_for_the_posture_at_its_stamp(bench):
+    bench.publish_posture(0, pan=0.0)
+    send(bench, VF_DELTA, 50)
+    send(bench, JOINT_STATES, 40, 0.2, 0.0)
+    send(bench, FACE_DELTA, 50)
+    assert bench.node.calls == []
+    assert bench.node.synchroniser.waits_for_posture
+    send(bench, JOINT_STATES, 60, 0.4, 0.0)
+    assert bench.node.calls == [('pair', 50, 0.3)]
+    assert not bench.node.synchroniser.waits_for_posture
+
+
+def test_a_further_topic_belongs_to_the_stamps_that_the_first_value_says(bench):
+    bench.publish_posture(0)
+    send(bench, JOINT_STATES, 100, 0.0, 0.0)
+    send(bench, VF_DELTA, 20, 0.1, 0.1)  # with a value: LM_DELTA belongs to the set
+    send(bench, FACE_DELTA, 20)
+    assert bench.node.calls == []
+    send(bench, LM_DELTA, 20)
+    assert bench.node.calls == [('pair', 20, 0.0)]
+
+
+def test_sets_of_a_stamp_are_called_in_the_order_in_which_they_were_asked_for(bench):
+    bench.publish_posture(0)
+    send(bench, JOINT_STATES, 100, 0.0, 0.0)
+    send(bench, FIXATION, 10)  # before the pair of the same stamp
+    assert bench.node.calls == []
+    send(bench, VF_DELTA, 10)
+    send(bench, FACE_DELTA, 10)
+    assert [call[:2] for call in bench.node.calls] == [('pair', 10), ('single', 10)]
+
+
+def test_missing_topics_are_named(bench):
+    send(bench, VF_DELTA, 10)
+    assert bench.node.synchroniser.missing_topics() == {FACE_DELTA.name, FIXATION.name}
+
+
+def test_a_set_whose_posture_is_older_than_the_history_is_reported(bench):
+    bench.publish_posture(1000 * MS)
+    send(bench, JOINT_STATES, 1100, 0.0, 0.0)
+    send(bench, VF_DELTA, 10)
+    send(bench, FACE_DELTA, 10)
+    bench.wait_for_complaint('no joint state for the stamp')
+    assert bench.node.calls == []
+
+
+def test_a_patient_node_is_called_without_a_posture_after_its_patience(make_bench):
+    bench = make_bench(PatientRecorder, publishes=SPOKEN)
+    bench.node.calibrated = False
+    send(bench, VF_DELTA, 10)
+    send(bench, FACE_DELTA, 10)
+    bench.wait(lambda: bench.node.calls)
+    assert bench.node.calls == [('pair', 10, None)]

@@ -1,0 +1,92 @@
+"""What `./ja docs` adds to the pages of docs/: the README, a reference page a module, diagrams."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import re
+from pathlib import Path
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+from pygments.formatters import HtmlFormatter
+
+ROOT = Path(__file__).resolve().parent.parent
+SOURCES = ROOT / 'ros2_ws' / 'src'
+# Blocks of Mermaid stay readable text where a browser opens the pages without a web server.
+_DRAW_DIAGRAMS = """
+<script type="module">
+import {mermaid} from '%s';
+mermaid.initialize({startOnLoad: false});
+await mermaid.run();
+</script>
+"""
+_LINK = re.compile(r'(?P<text>\[[^\]]*\])\((?!https?:|#)(?P<path>[^)#\s]+)(?P<rest>[^)]*)\)')
+
+
+def modules() -> list[str]:
+    """Return the dotted names of all modules with a docstring, package by package."""
+    names = []
+    for path in sorted(SOURCES.glob('ja_*/ja_*/**/*.py')):
+        if path.stem.startswith('_') or not ast.get_docstring(ast.parse(path.read_text())):
+            continue
+        names.append('.'.join(path.relative_to(SOURCES).with_suffix('').parts[1:]))
+    return names
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Append the reference to the navigation, a section a package."""
+    packages: dict[str, list[dict[str, str]]] = {}
+    for name in modules():
+        package, _, rest = name.partition('.')
+        packages.setdefault(package, []).append({rest: f'reference/{name}.md'})
+    config.nav = [*config.nav, {'Reference': [{p: pages} for p, pages in packages.items()]}]
+    return config
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the pages and assets that are no files of docs/."""
+
+    def add(uri: str, **source: str) -> None:
+        files.append(File.generated(config, uri, **source))
+
+    add('index.md', content=(ROOT / 'README.md').read_text())
+    for name in modules():
+        add(f'reference/{name}.md', content=f'# {name}\n\n::: {name}\n')
+    style = HtmlFormatter(style='default').get_style_defs('.highlight')
+    add('assets/site.css', content=f'{style}\n.wy-nav-content {{ max-width: 60em }}\n')
+    for path in _mermaid().glob('*.js'):
+        add(f'assets/mermaid/{path.name}', abs_src_path=str(path))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Turn links that lead out of docs/ into plain text, and those of the README into the site."""
+    folder = ROOT if page.file.src_uri == 'index.md' else (ROOT / 'docs' / page.file.src_uri).parent
+
+    def relinked(link: re.Match[str]) -> str:
+        target = (folder / link['path']).resolve()
+        if not target.is_relative_to(ROOT / 'docs'):
+            return link['text'][1:-1]
+        if folder != ROOT:
+            return link[0]
+        return f'{link["text"]}({target.relative_to(ROOT / "docs")}{link["rest"]})'
+
+    return _LINK.sub(relinked, markdown)
+
+
+def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Draw the diagrams of a page."""
+    if 'class="mermaid"' not in html:
+        return html
+    depth = page.file.src_uri.count('/')
+    return html + _DRAW_DIAGRAMS % ('./' + '../' * depth + 'assets/mermaid/index.js')
+
+
+def _mermaid() -> Path:
+    """Return the folder of the copy of Mermaid that comes with the live page's NiceGUI."""
+    found = importlib.util.find_spec('nicegui')
+    assert found is not None
+    assert found.origin is not None
+    return Path(found.origin).parent / 'elements' / 'mermaid' / 'dist'
