@@ -71,29 +71,56 @@ class Environment:
         """
         sourced = ros_is_sourced(self.environ)
         extra = [lock for lock, wanted in (('dev.lock', dev), ('docs.lock', docs)) if wanted]
-        if self._is_ready(sourced, extra):
+        # The tests need every part.
+        without = () if dev else self._without()
+        if self._is_ready(sourced, extra, without):
             return
         with self._only_one():
             python = self._choose_python(sourced)
-            self._install_system_packages(machine.missing_system_packages(python))
-            for step in steps_to_do(self._steps(python.version, sourced, extra), self._stamp()):
-                self._do(step, python)
+            system = machine.missing_system_packages(python, renders='sim' not in without)
+            self._install_system_packages(system)
+            steps = self._steps(python.version, sourced, extra, without)
+            for step in steps_to_do(steps, self._stamp()):
+                self._do(step, python, without)
+            if not dev:
+                self._record('without', list(without))
 
-    def _is_ready(self, sourced: bool, extra: Sequence[str]) -> bool:
-        """The quick way, without starting an interpreter."""
+    def _without(self) -> tuple[str, ...]:
+        """Return the parts to leave out: those of JA_WITHOUT, or else those of the last run."""
+        text = self.environ.get('JA_WITHOUT')
+        if text is None:
+            text = ' '.join(self._stamp().get('without', ()))
+        return parts_left_out(text)
+
+    def _is_ready(self, sourced: bool, extra: Sequence[str], without: Sequence[str]) -> bool:
+        """Return whether nothing is to do, without starting an interpreter."""
         wanted = self.environ.get('JA_PYTHON')
         recorded = self._stamp().get('python', {})
         if not recorded:
             return False
         if wanted and shutil.which(wanted) != recorded.get('asked'):
             return False
+        # A part left out for the first time is remembered, though no step is outdated.
+        remembered = self._stamp().get('without', [])
+        if 'dev.lock' not in extra and list(without) != remembered:
+            return False
         version = tuple(recorded['version'])
-        return not steps_to_do(self._steps(version, sourced, extra), self._stamp())
+        return not steps_to_do(self._steps(version, sourced, extra, without), self._stamp())
 
-    def _steps(self, version: tuple[int, int], sourced: bool, extra: Sequence[str]) -> list[Step]:
-        """In this order: each stands on those before it."""
+    def _steps(
+        self,
+        version: tuple[int, int],
+        sourced: bool,
+        extra: Sequence[str],
+        without: Sequence[str],
+    ) -> list[Step]:
+        """Return the steps in their order: each needs those before it."""
         locks = self.root / 'requirements'
-        base = [] if sourced else ['ros.lock']
+        wanted = [
+            *([] if sourced else ['ros.lock']),
+            'base.lock',
+            *(f'{part}.lock' for part in PARTS if part not in without),
+        ]
         ros = self.environ.get('AMENT_PREFIX_PATH', '') if sourced else 'wheels'
         steps = [
             Step('environment', fingerprint('{}.{}'.format(*version), ros, str(self.root))),
@@ -170,7 +197,7 @@ class Environment:
         """Run a command, its output into the log; raises BootstrapError when it fails."""
         self.log.parent.mkdir(exist_ok=True)
         with self.log.open('a', encoding='utf-8') as log:
-            start = log.tell()
+            start = log.seek(0, os.SEEK_END)
             log.write(f'$ {" ".join(command)}\n')
             log.flush()
             try:

@@ -1,4 +1,4 @@
-"""Fixtures of the node tests: a domain of its own, a private context."""
+"""Fixtures of the node tests: a ROS domain of its own, a private context."""
 
 import os
 import random
@@ -8,9 +8,9 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 
 import pytest
-import rclpy
 from rclpy.context import Context
 
+from ja_common.private_context import private_context
 from ja_common.ros_defaults import apply_ros_defaults
 from node_bench import NodeBench
 
@@ -24,7 +24,7 @@ _LOCK_PORT = 32768
 
 @pytest.fixture
 def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """A ROS_DOMAIN_ID that no other test of this machine uses, also in os.environ.
+    """Choose a ROS_DOMAIN_ID that no other test of this machine uses, also in os.environ.
 
     It is held by a listening socket, which the system releases however the test ends. A fresh
     one for each test: no test hears what another left behind.
@@ -43,18 +43,16 @@ def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
 
 @pytest.fixture
 def ros_context(domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Context]:
-    """An initialised rclpy Context of this test alone, in the test's own domain and folder."""
+    """Initialise an rclpy Context of this test alone, in the test's own domain and folder."""
     # What a rig has learned in runs/, here where the tests are run, is not for them.
     monkeypatch.chdir(tmp_path)
-    context = Context()
-    rclpy.init(args=[], context=context, domain_id=domain)
-    yield context
-    context.try_shutdown()
+    with private_context(domain_id=domain) as context:
+        yield context
 
 
 @pytest.fixture
 def make_bench(ros_context: Context) -> Iterator[Callable[..., NodeBench]]:
-    """Makes a NodeBench in the test's own domain; its nodes are destroyed at the end."""
+    """Return a maker of NodeBenches in the test's own domain; each is closed at the end."""
     with ExitStack() as benches:
         yield lambda *args, **kwargs: benches.enter_context(
             closing(NodeBench(ros_context, *args, **kwargs))

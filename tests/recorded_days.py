@@ -1,4 +1,4 @@
-"""A day as a recorder keeps it: looks at a caregiver, and fixations of what she meant."""
+"""A recording for tests: looks at a caregiver, and fixations of the attended object."""
 
 import numpy as np
 
@@ -21,39 +21,39 @@ TRIALS = 40
 
 
 def day(count: int = TRIALS) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Trials: the face (a bright column where she looks), what she means, another object."""
+    """Return trials: the face (a bright column shows the gaze), attended and other direction."""
     rng = np.random.default_rng(0)
     trials = []
     for _ in range(count):
-        meant = np.array([rng.uniform(-0.25, 0.25), 0.1])
+        attended = np.array([rng.uniform(-0.25, 0.25), 0.1])
         face = np.full((30, 25), 100, np.uint8)
-        column = int(12 + 40 * meant[0])
+        column = int(12 + 40 * attended[0])
         face[:, column - 1 : column + 2] = 250
-        trials.append((face, meant, np.array([-meant[0] + 0.1, -0.1])))
+        trials.append((face, attended, np.array([-attended[0] + 0.1, -0.1])))
     return trials
 
 
-def said_in(trials, with_truth: bool = True):
-    """Two images a trial: the look, and the fixation of what she means (always the right one)."""
-    for number, (face, meant, other) in enumerate(trials):
-        for part, posture in enumerate((LOOK, meant)):
+def messages_of(trials, with_truth: bool = True):
+    """Yield the messages of two images a trial: the look, and the fixation of the attended object."""
+    for number, (face, attended, other) in enumerate(trials):
+        for part, posture in enumerate((LOOK, attended)):
             stamp_ns = (2 * number + part) * NS_PER_S // 10
             head = header(stamp_ns)
             if with_truth:
                 columns = np.zeros((len(FIELDS), 2))
-                columns[FIELDS.index('pan')] = meant[0], other[0]
-                columns[FIELDS.index('tilt')] = meant[1], other[1]
+                columns[FIELDS.index('pan')] = attended[0], other[0]
+                columns[FIELDS.index('tilt')] = attended[1], other[1]
                 columns[FIELDS.index('attended')] = 1, 0
                 columns[FIELDS.index('trial')] = number + 1
                 truth = encode_columns(head, dict(zip(FIELDS, columns, strict=True)))
                 yield stamp_ns, SIM_TRUTH, truth
             yield stamp_ns, JOINT_STATES, JOINTS.encode(head, posture, np.zeros(2))
-            seen = [detected(Kind.OBJECT, posture, each) for each in (meant, other)]
+            seen = [detected(Kind.OBJECT, posture, each) for each in (attended, other)]
             if part == 0:
                 yield stamp_ns, FACE_IMAGE, encode_image(face, head.stamp, '')
                 seen.append(detected(Kind.FACE, posture, LOOK))
             yield stamp_ns, DETECTIONS, encode_detections(head, seen)
-            yield stamp_ns, FIXATION, JOINTS.encode(head, meant if part else None)
+            yield stamp_ns, FIXATION, JOINTS.encode(head, attended if part else None)
 
 
 def detected(kind: Kind, posture, direction) -> Detection:
@@ -62,4 +62,4 @@ def detected(kind: Kind, posture, direction) -> Detection:
 
 
 def recorded(path, count: int = TRIALS, **kwargs) -> Recording:
-    return Recording(write_recording(path, said_in(day(count), **kwargs)))
+    return Recording(write_recording(path, messages_of(day(count), **kwargs)))

@@ -1,4 +1,4 @@
-"""What node tests share: waiting for a condition instead of sleeping for luck."""
+"""Waiting for a condition in node tests, instead of sleeping for a fixed time."""
 
 import time
 from collections.abc import Callable

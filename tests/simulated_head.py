@@ -1,7 +1,7 @@
 """A simulated head that is led through a calibration, without ROS.
 
-Servos, play and encoders are the sim's. What it sees is a wall far away, drawn by a warp, which
-takes a hundredth of the time of the sim's room; `picture_of` may give that room instead.
+Servos, play and encoders are the sim's. Its camera sees a wall far away, drawn by a warp, in a
+hundredth of the time of the sim's room; `picture_of` may be that room instead.
 """
 
 import math
@@ -29,7 +29,7 @@ _OPTICAL = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 
 
 def focal_lengths(head: HeadSpec) -> NDArray[np.float64]:
-    """The true ones, (2,) [px]."""
+    """Return the true focal lengths, (2,) [px]."""
     view = np.radians([head.view_pan_deg, head.view_tilt_deg])
     return np.array([WIDTH, HEIGHT]) / 2 / np.tan(view)
 
@@ -50,6 +50,7 @@ class Wall:
         self._shift = np.array([[1.0, 0.0, -WIDTH], [0.0, 1.0, -HEIGHT], [0.0, 0.0, 1.0]])
 
     def picture(self, posture: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """Return the picture (H, W) from a posture (2,) [rad]."""
         turn = _OPTICAL @ head_rotation(posture).T @ _OPTICAL.T
         warp = self._camera @ turn @ np.linalg.inv(self._camera) @ self._shift
         sharp = cv2.warpPerspective(self._wall, warp, (WIDTH, HEIGHT), borderMode=cv2.BORDER_WRAP)
@@ -65,16 +66,16 @@ def calibrated(
     picture_of: Callable[[NDArray[np.float64]], NDArray[np.uint8]] | None = None,
     seed: int = 0,
 ) -> Calibration:
-    """What is found of a head whose joints count by `signs`, and whose pictures' stamps are late.
+    """Return the calibration of a head whose joints count by `signs`, with late image stamps.
 
-    Pictures come in the hour of their stamp, as the joint states do, at 14 a second.
+    Pictures arrive at the time of their stamp, as the joint states do, at 14 per second.
     """
     head, rng = PanTiltHead(spec), np.random.default_rng(seed)
     picture_of = picture_of or Wall(spec, seed).picture
     turns = np.asarray(signs)
     sequence = CalibrationSequence(calibration_moves(config, np.zeros(2)))
     history = PostureHistory()
-    film: deque[tuple[int, NDArray[np.float64]]] = deque()
+    pictures: deque[tuple[int, NDArray[np.float64]]] = deque()
     position, profiles, speed = np.zeros(2), list[MotionProfile](), math.nan
     period = 0
     while sequence.result is None:
@@ -94,9 +95,9 @@ def calibrated(
         history.record_posture(now_ns, angles)
         sequence.record_joints(now_ns, angles)
         if period % PERIODS_AN_IMAGE == 0:
-            film.append((now_ns + round(stamps_late_s * 1e9), head.posture))
-        while film and film[0][0] <= now_ns:
-            stamp_ns, posture = film.popleft()
+            pictures.append((now_ns + round(stamps_late_s * 1e9), head.posture))
+        while pictures and pictures[0][0] <= now_ns:
+            stamp_ns, posture = pictures.popleft()
             measured = history.at(stamp_ns)
             if sequence.needs_images and measured is not None:
                 sequence.record_image(picture_of(posture), stamp_ns, measured.position)

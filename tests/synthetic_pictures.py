@@ -1,4 +1,4 @@
-"""Drawn pictures: a face that face detectors know for one, and coloured things."""
+"""Drawn pictures: a face that face detectors detect, and coloured discs."""
 
 import cv2
 import numpy as np
@@ -7,7 +7,7 @@ _SHIFT = 4
 
 
 def room(width: int = 320, height: int = 240) -> np.ndarray:
-    """An (H, W, 3) RGB picture of nothing in particular: a grey-blue wall."""
+    """Return an (H, W, 3) RGB picture of a grey-blue wall."""
     return np.full((height, width, 3), (150, 160, 170), np.uint8)
 
 

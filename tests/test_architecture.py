@@ -6,6 +6,7 @@ Who may import whom is held by `graph/test_rooms.py`.
 import ast
 import dataclasses
 import importlib
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -135,6 +136,38 @@ def test_node_module_ends_with_its_main(path):
     classes = [node.name for node in TREES[path].body if isinstance(node, ast.ClassDef)]
     thing = path.stem.removesuffix('_node').title().replace('_', '')
     assert f'{thing}Node' in classes
+
+
+# What variables that hold one of rclpy's objects are called, and names private to these.
+_OF_RCLPY = {'node', '_node', 'executor', '_executor', 'subscription', 'publisher', 'context'}
+_PRIVATE_NAMES = {
+    'handle', '_parameters', '_parameter_overrides', '_callback_type', '_sigint_gc', '_tasks_lock',
+    '_spin_once_impl', 'get_c_qos_profile', 'destroy_when_not_in_use', 'rclpy_implementation',
+}  # fmt: skip
+
+
+def test_private_api_of_rclpy_is_used_in_one_module():
+    imports = {
+        path
+        for path, node in nodes_of(ast.ImportFrom)
+        for part in (f'{node.module}.{alias.name}' for alias in node.names)
+        if part.startswith('rclpy.impl') or re.match(r'rclpy\b.*\._', part)
+    }
+    ros = {path for path, node in nodes_of(ast.ImportFrom) if 'rclpy' in (node.module or '')}
+    ros |= set(NODES)
+    uses = {
+        path
+        for path, node in nodes_of(ast.Attribute)
+        if path in ros
+        and (node.attr in _PRIVATE_NAMES or (node.attr[0] == '_' and _holder(node) in _OF_RCLPY))
+    }
+    names = {path for path, node in nodes_of(ast.FunctionDef) if node.name == '_spin_once_impl'}
+    assert imports | uses | names == {Path('ja_common/ja_common/rclpy_private.py')}
+
+
+def _holder(attribute: ast.Attribute) -> str:
+    """Return the last name before the attribute: `node` in `self.node._parameters`."""
+    return ast.unparse(attribute.value).split('.')[-1]
 
 
 @pytest.mark.parametrize('package', PACKAGES)

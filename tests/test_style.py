@@ -1,4 +1,4 @@
-"""ruff and mypy, as part of the suite: what they find is a failure here, not an opinion."""
+"""ruff and mypy, as part of the suite: each of their findings is a failure."""
 
 import subprocess
 import sys

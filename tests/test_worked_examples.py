@@ -1,4 +1,4 @@
-"""The worked examples of docs/change_it: their code is taken out of the pages and run."""
+"""The worked examples of docs/change_it: the code of the pages is run."""
 
 import os
 import re

@@ -14,7 +14,7 @@ from pygments.formatters import HtmlFormatter
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCES = ROOT / 'ros2_ws' / 'src'
-# Blocks of Mermaid stay readable text where a browser opens the pages without a web server.
+# Diagrams stay readable text without a web server, or without NiceGUI.
 _DRAW_DIAGRAMS = """
 <script type="module">
 import {mermaid} from '%s';
@@ -56,14 +56,16 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         add(f'reference/{name}.md', content=f'# {name}\n\n::: {name}\n')
     style = HtmlFormatter(style='default').get_style_defs('.highlight')
     add('assets/site.css', content=f'{style}\n.wy-nav-content {{ max-width: 60em }}\n')
-    for path in _mermaid().glob('*.js'):
+    for path in _mermaid_scripts():
         add(f'assets/mermaid/{path.name}', abs_src_path=str(path))
     return files
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Turn links that lead out of docs/ into plain text, and those of the README into the site."""
-    folder = ROOT if page.file.src_uri == 'index.md' else (ROOT / 'docs' / page.file.src_uri).parent
+    folder = (
+        ROOT if page.file.src_uri == 'index.md' else (ROOT / 'docs' / page.file.src_uri).parent
+    )
 
     def relinked(link: re.Match[str]) -> str:
         target = (folder / link['path']).resolve()
@@ -84,9 +86,9 @@ def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -
     return html + _DRAW_DIAGRAMS % ('./' + '../' * depth + 'assets/mermaid/index.js')
 
 
-def _mermaid() -> Path:
-    """Return the folder of the copy of Mermaid that comes with the live page's NiceGUI."""
+def _mermaid_scripts() -> list[Path]:
+    """Return the files of NiceGUI's Mermaid; none where the live page is left out."""
     found = importlib.util.find_spec('nicegui')
-    assert found is not None
-    assert found.origin is not None
-    return Path(found.origin).parent / 'elements' / 'mermaid' / 'dist'
+    if found is None or found.origin is None:
+        return []
+    return sorted((Path(found.origin).parent / 'elements' / 'mermaid' / 'dist').glob('*.js'))

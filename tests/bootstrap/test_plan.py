@@ -9,6 +9,7 @@ from bootstrap.plan import (
     apt_advice,
     choose_python,
     fingerprint,
+    parts_left_out,
     ros_is_sourced,
     steps_to_do,
 )
@@ -81,3 +82,14 @@ def test_apt_advice_gives_the_exact_command_to_those_who_lack_the_right():
     command = 'sudo apt-get update && sudo apt-get install -y libegl1 libgl1-mesa-dri'
     assert command in apt_advice(['libegl1', 'libgl1-mesa-dri'], is_root=False, has_apt=True)
     assert 'package manager' in apt_advice(['libegl1'], is_root=True, has_apt=False)
+
+
+def test_without_the_sim_there_are_no_experiments():
+    assert parts_left_out('') == ()
+    assert parts_left_out('dashboard') == ('dashboard',)
+    assert parts_left_out('sim,dashboard') == ('dashboard', 'experiments', 'sim')
+
+
+def test_an_unknown_part_is_named():
+    with pytest.raises(BootstrapError, match=r'JA_WITHOUT=sim gate: no part is called gate'):
+        parts_left_out('sim gate')

@@ -9,17 +9,18 @@ import pytest
 
 from bootstrap import machine, setup_environment
 from bootstrap.machine import clean_environ, probe_python
-from bootstrap.plan import BootstrapError, Python
+from bootstrap.plan import PARTS, BootstrapError, Python
 from bootstrap.setup_environment import STAMP, Environment
 
 ROOT = Path(__file__).parents[2]
+PART_LOCKS = [f'{part}.lock' for part in PARTS]
 
 
 class Recorded(Environment):
     """Does not run anything; `fail_at` is a word of the command that is interrupted."""
 
     def __init__(self, root: Path, environ: dict[str, str] | None = None) -> None:
-        super().__init__(root, environ or {}, say=lambda _: None)
+        super().__init__(root, environ or {}, report=lambda _: None)
         self.commands: list[str] = []
         self.fail_at = ''
 
@@ -34,23 +35,29 @@ class Recorded(Environment):
             python.touch()
 
     def did(self) -> list[str]:
-        """The words that tell the steps apart, in order; and forget them."""
-        words = ('-m venv', 'ros.lock', 'base.lock', '-e ', 'dev.lock', 'apt-get')
-        found = [word for text in self.commands for word in words if word in text]
+        """Return the word of each command that names its step, in order, and forget them."""
+        words = ('-m venv', '.lock', '-e ', 'apt-get')
+        found = [
+            text.rsplit('/', 1)[1] if word == '.lock' else word
+            for text in self.commands
+            for word in words
+            if word in text
+        ]
         self.commands = []
         return found
 
 
 @pytest.fixture
 def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    package = tmp_path / 'ros2_ws' / 'src' / 'ja_one'
-    package.mkdir(parents=True)
-    for name in ('setup.py', 'setup.cfg'):
-        (package / name).touch()
+    for name in ('ja_one', *(package for part in PARTS.values() for package in part)):
+        package = tmp_path / 'ros2_ws' / 'src' / name
+        package.mkdir(parents=True)
+        for file in ('setup.py', 'setup.cfg', 'package.xml'):
+            (package / file).touch()
     (tmp_path / 'requirements').mkdir()
-    for name in ('ros', 'base', 'dev'):
+    for name in ('ros', 'base', 'dev', 'docs', *PARTS):
         (tmp_path / 'requirements' / f'{name}.lock').write_text(name)
-    monkeypatch.setattr(machine, 'missing_system_packages', lambda python: [])
+    monkeypatch.setattr(machine, 'missing_system_packages', lambda python, renders: [])
     monkeypatch.setattr(
         machine, 'pythons', lambda environ, existing: [Python('python3.12', (3, 12), True)]
     )
@@ -60,7 +67,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_all_the_steps_once_and_then_none(checkout):
     environment = Recorded(checkout)
     environment.prepare()
-    assert environment.did() == ['-m venv', 'ros.lock', 'base.lock', '-e ']
+    assert environment.did() == ['-m venv', 'ros.lock', 'base.lock', *PART_LOCKS, '-e ']
     environment.prepare()
     assert environment.did() == []
 
@@ -73,6 +80,46 @@ def test_tests_need_one_step_more(checkout):
     assert environment.did() == ['dev.lock']
     environment.prepare()
     assert environment.did() == []
+
+
+def installed(environment: Recorded) -> set[str]:
+    """Names of the packages of ours that the last command installed."""
+    return {Path(word).name for word in environment.commands[-1].split() if 'ros2_ws' in word}
+
+
+def test_a_rig_leaves_out_the_parts_that_it_does_not_need(checkout):
+    environment = Recorded(checkout, {'JA_WITHOUT': 'sim dashboard experiments'})
+    environment.prepare()
+    assert installed(environment) == {'ja_one'}
+    assert environment.did() == ['-m venv', 'ros.lock', 'base.lock', '-e ']
+
+
+def test_what_is_left_out_is_remembered_and_may_be_added_later(checkout):
+    Recorded(checkout, {'JA_WITHOUT': 'dashboard'}).prepare()
+    environment = Recorded(checkout)
+    environment.prepare()
+    assert environment.did() == []
+    environment = Recorded(checkout, {'JA_WITHOUT': ''})
+    environment.prepare()
+    assert 'ja_dashboard' in installed(environment)
+    assert environment.did() == ['dashboard.lock', '-e ']
+
+
+def test_a_part_that_is_left_out_of_a_full_environment_is_remembered(checkout):
+    Recorded(checkout).prepare()
+    Recorded(checkout, {'JA_WITHOUT': 'sim'}).prepare()
+    (checkout / 'requirements' / 'sim.lock').write_text('newer')
+    environment = Recorded(checkout)
+    environment.prepare()
+    assert environment.did() == []
+
+
+def test_the_tests_need_every_part(checkout):
+    environment = Recorded(checkout, {'JA_WITHOUT': 'sim'})
+    environment.prepare()
+    environment.did()
+    environment.prepare(dev=True)
+    assert environment.did() == ['sim.lock', 'experiments.lock', '-e ', 'dev.lock']
 
 
 def test_a_changed_lock_is_installed_again(checkout):
@@ -92,7 +139,7 @@ def test_an_interrupted_setup_goes_on_where_it_was(checkout):
     assert environment.did() == ['-m venv', 'ros.lock']
     environment.fail_at = ''
     environment.prepare()
-    assert environment.did() == ['base.lock', '-e ']
+    assert environment.did() == ['base.lock', *PART_LOCKS, '-e ']
 
 
 def test_a_damaged_stamp_or_a_lost_environment_means_a_new_one(checkout):
@@ -111,15 +158,15 @@ def test_where_ros_is_sourced_no_ros_wheel_is_installed(checkout):
     sourced = {'ROS_DISTRO': 'jazzy', 'AMENT_PREFIX_PATH': '/opt/ros/jazzy'}
     environment = Recorded(checkout, sourced)
     environment.prepare()
-    assert environment.did() == ['-m venv', 'base.lock', '-e ']
+    assert environment.did() == ['-m venv', 'base.lock', *PART_LOCKS, '-e ']
     # And the other way round: the same checkout in a shell without ROS.
     environment = Recorded(checkout, {})
     environment.prepare()
-    assert environment.did() == ['-m venv', 'ros.lock', 'base.lock', '-e ']
+    assert environment.did() == ['-m venv', 'ros.lock', 'base.lock', *PART_LOCKS, '-e ']
 
 
 def test_missing_system_packages_are_installed_by_root(checkout, monkeypatch):
-    monkeypatch.setattr(machine, 'missing_system_packages', lambda python: ['libegl1'])
+    monkeypatch.setattr(machine, 'missing_system_packages', lambda python, renders: ['libegl1'])
     monkeypatch.setattr(machine, 'is_root', lambda: True)
     monkeypatch.setattr(machine, 'has_apt', lambda: True)
     environment = Recorded(checkout)
@@ -129,7 +176,7 @@ def test_missing_system_packages_are_installed_by_root(checkout, monkeypatch):
 
 
 def test_missing_system_packages_are_named_to_others(checkout, monkeypatch):
-    monkeypatch.setattr(machine, 'missing_system_packages', lambda python: ['libegl1'])
+    monkeypatch.setattr(machine, 'missing_system_packages', lambda python, renders: ['libegl1'])
     monkeypatch.setattr(machine, 'is_root', lambda: False)
     environment = Recorded(checkout)
     with pytest.raises(BootstrapError, match='libegl1'):
@@ -145,14 +192,14 @@ def test_missing_system_packages_are_named_to_others(checkout, monkeypatch):
     ],
 )
 def test_a_failing_command_is_explained_and_logged(tmp_path, output, expected):
-    environment = Environment(tmp_path, {}, say=lambda _: None)
+    environment = Environment(tmp_path, {}, report=lambda _: None)
     with pytest.raises(BootstrapError, match=expected):
         environment._run([sys.executable, '-c', f'print({output!r}); raise SystemExit(1)'])
     assert output in environment.log.read_text()
 
 
 def test_two_setups_at_once_wait_for_each_other(checkout):
-    """The second finds everything done by the first when it gets its turn."""
+    """The second process finds everything done by the first one."""
     first, second = Recorded(checkout), Recorded(checkout)
     with first._only_one(), pytest.raises(BlockingIOError):
         setup_environment.fcntl.flock(

@@ -1,7 +1,7 @@
 """Camera, Eq. 2, guard and a hobby servo in one loop, with 60 ms from exposure to picture.
 
-The cores alone, in simulated time: what is seen is the exact ray to one target, so that the loop
-is judged and not the detector.
+The cores alone, in simulated time. The exact ray to one target replaces the detector, so that only
+the loop is tested.
 """
 
 from collections import deque
@@ -23,7 +23,7 @@ CONTROL_S, CAMERA_TICKS, DELAY_S = 0.01, 3, 0.06
 
 
 def pursue(target, seconds, spec=HEAD_PRESETS['hobby_servo']):
-    """Drive the head at target(t) (2,) [rad]; times (N,) and true postures (N, 2)."""
+    """Drive the head to target(t) (2,) [rad]; return times (N,) and true postures (N, 2)."""
     head, history = PanTiltHead(spec), PostureHistory()
     guard = CommandGuard(JointLimitsConfig(), CommandGuardConfig(), CONTROL_S)
     rng = np.random.default_rng(0)
@@ -76,7 +76,7 @@ def test_a_moving_object_is_pursued_smoothly():
 
 
 def test_newest_posture_instead_of_that_of_the_image_would_overshoot():
-    """The bug that the interpolation at the stamp is there for; it shows in this very loop."""
+    """The loop shows the error that the interpolation at the stamp prevents."""
     aim = np.radians([20.0, 0.0])
     original = PostureHistory.at
     with pytest.MonkeyPatch.context() as patch:

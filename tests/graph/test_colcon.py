@@ -7,9 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from ja_common.executor import CachedWaitSetExecutor
 from ros_testing import spin_until
 
 SOURCES = Path(__file__).parents[2] / 'ros2_ws' / 'src'
@@ -37,7 +37,7 @@ def test_a_node_of_the_built_workspace_runs(tmp_path, ros_context):
         assert _data(SOURCES / package / package) <= _data(Path(found.decode()).parent)
 
     watcher = Node('watcher', context=ros_context)
-    executor = SingleThreadedExecutor(context=ros_context)
+    executor = CachedWaitSetExecutor(context=ros_context)
     executor.add_node(watcher)
     # Where `ros2 run ja_control gate` looks, and what it starts.
     executable = install / 'ja_control' / 'lib' / 'ja_control' / 'gate'

@@ -1,13 +1,13 @@
-"""What goes wrong in a running graph, in real processes."""
+"""Faults of a running graph, in real processes."""
 
 import os
 import signal
 import subprocess
 
 import pytest
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from ja_common.executor import CachedWaitSetExecutor
 from ja_common.topics import DIAGNOSTICS
 from ja_runner.node_spec import NodeSpec
 from ros_testing import spin_until
@@ -17,7 +17,7 @@ CONTROLLER = NodeSpec('ja_control', 'visual_feedback_controller')
 
 @pytest.fixture
 def controller(ros_context):
-    """The process of a node."""
+    """Run a node as a process."""
     process = subprocess.Popen(CONTROLLER.command())
     yield process
     process.kill()
@@ -25,7 +25,7 @@ def controller(ros_context):
 
 
 def test_name_of_a_node_that_was_halted_is_known_again(ros_context, controller):
-    """DDS would never tell it again: it stays unknown to every tool."""
+    """Without a countermeasure DDS never sends the name again, and no tool knows the node."""
     watcher = Node('watcher', context=ros_context)
     complaints = []
 
@@ -33,7 +33,7 @@ def test_name_of_a_node_that_was_halted_is_known_again(ros_context, controller):
         complaints.extend(status.message for status in array.status)
 
     watcher.create_subscription(DIAGNOSTICS.type, DIAGNOSTICS.name, note, 10)
-    executor = SingleThreadedExecutor(context=ros_context)
+    executor = CachedWaitSetExecutor(context=ros_context)
     executor.add_node(watcher)
 
     def is_known():

@@ -29,7 +29,7 @@ RUNS = 10
 
 
 def demo_settings() -> dict[str, Any]:
-    """What the demo sets of the gate and of the learner, by the parameters' names."""
+    """Return the parameters that the demo sets for the gate and the learner."""
     path = resources.files('ja_runner') / 'config' / 'demo_paper.yaml'
     nodes = yaml.safe_load(path.read_text(encoding='utf-8'))
     settings = {k: v for node in nodes.values() for k, v in node['ros__parameters'].items()}
@@ -38,12 +38,12 @@ def demo_settings() -> dict[str, Any]:
 
 
 def curve(success: NDArray[Any]) -> NDArray[np.float64]:
-    """Share of successes in every block of trials."""
+    """Return the share of successes in every block of trials."""
     return success[: BLOCKS * BLOCK].reshape(BLOCKS, BLOCK).mean(axis=1)
 
 
 def graph_curve(folder: Path) -> NDArray[np.float64]:
-    """One run of the graph in lockstep, as the demo starts it."""
+    """Return the curve of one run of the graph in lockstep, as the demo starts it."""
     trials, most_s = str(BLOCKS * BLOCK + 1), '900'  # by trials: a busy machine learns as much
     options = ['--learner', 'paper', '--scene', SCENE, '--seed', str(SEED), '--exam', '0']
     command = [sys.executable, '-m', 'ja_bringup.cli', 'demo', *options]
@@ -55,7 +55,7 @@ def graph_curve(folder: Path) -> NDArray[np.float64]:
 
 
 def experiment_curves() -> NDArray[np.float64]:
-    """The experiment without ROS, (runs, blocks)."""
+    """Run the experiment without ROS; return its curves (runs, blocks)."""
     places = load_scene(SCENE).objects
     config = ExperimentConfig().with_settings({**demo_settings(), 'objects': places.count})
     looks = load_looks(SCENE, SEED)

@@ -1,4 +1,4 @@
-"""The learner is killed in the running graph, started again, and goes on where it was."""
+"""The learner is killed in the running graph, restarted, and continues where it was."""
 
 import os
 import signal
@@ -8,12 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
+from rclpy.executors import Executor
 from rclpy.node import Node
 
-from ja_common.executor import CachedWaitSetExecutor
+from ja_common.private_context import private_executor
 from ja_common.topics import DIAGNOSTICS
 from ja_runner.graph import sim_graph
 from ja_runner.node_spec import NodeSpec
@@ -26,17 +26,17 @@ PATIENCE_S = 60.0
 pytestmark = [pytest.mark.usefixtures('domain'), pytest.mark.slow]
 
 
-class Witness(Node):
-    """Hears how many trials the learner has learned."""
+class LearnedTrials(Node):
+    """Receives the number of trials that the learner has learned."""
 
     def __init__(self, context: Context) -> None:
-        super().__init__('witness', context=context)
+        super().__init__('learned_trials', context=context)
         self.learned: int | None = None
         self.create_subscription(
-            DiagnosticArray, DIAGNOSTICS.name, self._hear, DIAGNOSTICS.subscriber_qos
+            DiagnosticArray, DIAGNOSTICS.name, self._on_diagnostics, DIAGNOSTICS.subscriber_qos
         )
 
-    def _hear(self, message: DiagnosticArray) -> None:
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.name == '/learning_module':
                 values = {pair.key: pair.value for pair in status.values}
@@ -56,39 +56,37 @@ def graph(folder: Path) -> list[NodeSpec]:
 
 
 def test_a_killed_learner_loses_few_trials_and_learns_on(tmp_path):
-    context = Context()
-    rclpy.init(args=[], context=context)
-    executor = CachedWaitSetExecutor(context=context)
-    witness = Witness(context)
-    executor.add_node(witness)
+    with private_executor() as executor:
+        counter = LearnedTrials(executor.context)
+        executor.add_node(counter)
+        kill_learner(counter, executor, tmp_path)
+
+
+def kill_learner(counter: LearnedTrials, executor: Executor, tmp_path: Path) -> None:
+    """Kill the learner `KILLS` times while the graph runs, and compare its counts of trials."""
     supervisor = Supervisor(graph(tmp_path / 'kept'), tmp_path / 'log', 'restart', print)
     counts: list[tuple[int, int]] = []
 
-    def story() -> Iterator[None]:
+    def kill_and_wait() -> Iterator[None]:
         known = 0
         for _ in range(KILLS):
-            yield from until(lambda known=known: (witness.learned or 0) > known + 2 * EVERY_TRIALS)
-            before, pid = witness.learned, supervisor.pids['learning_module']
+            yield from until(lambda known=known: (counter.learned or 0) > known + 2 * EVERY_TRIALS)
+            before, pid = counter.learned, supervisor.pids['learning_module']
             os.kill(pid, signal.SIGKILL)
             yield from until(lambda pid=pid: supervisor.pids['learning_module'] != pid)
-            witness.learned = None
-            yield from until(lambda: witness.learned is not None)
-            known = witness.learned
+            counter.learned = None
+            yield from until(lambda: counter.learned is not None)
+            known = counter.learned
             counts.append((before, known))
-        yield from until(lambda: witness.learned > known)
+        yield from until(lambda: counter.learned > known)
 
-    told = story()
+    steps = kill_and_wait()
 
     def tick() -> bool:
         executor.spin_once(timeout_sec=0.1)
-        return next(told, 'over') == 'over'
+        return next(steps, 'over') == 'over'
 
-    try:
-        assert supervisor.run(tick) == 0
-    finally:
-        executor.shutdown()
-        witness.destroy_node()
-        context.try_shutdown()
+    assert supervisor.run(tick) == 0
     assert len(counts) == KILLS
     assert all(after >= before - EVERY_TRIALS for before, after in counts), counts
     assert 'Traceback' not in (tmp_path / 'log' / 'learning_module.log').read_text()
@@ -97,5 +95,5 @@ def test_a_killed_learner_loses_few_trials_and_learns_on(tmp_path):
 def until(condition: Callable[[], bool]) -> Iterator[None]:
     end_s = time.monotonic() + PATIENCE_S
     while not condition():
-        assert time.monotonic() < end_s, 'the learner did not go on'
+        assert time.monotonic() < end_s, 'the learner did not continue'
         yield

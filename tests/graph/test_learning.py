@@ -14,8 +14,8 @@ SEEDS = (1, 2, 3)
 
 
 def learner_alone(learner: str, seed: int, folder: Path) -> dict[str, float]:
-    """Success rates of the learner alone in the exams of one demo."""
-    # By trials, not by time: a busy machine must not mean less practice.
+    """Return success rates of the learner alone in the exams of one demo."""
+    # By trials, not by time, so that a busy machine gives as much practice.
     options = ['--learner', learner, '--seed', str(seed), '--time', '900']
     demo = [sys.executable, '-m', 'ja_bringup.cli', 'demo', *options]
     ran = subprocess.run(demo, cwd=folder, capture_output=True, text=True, check=False)
@@ -30,7 +30,7 @@ def learner_alone(learner: str, seed: int, folder: Path) -> dict[str, float]:
 
 
 def interval(values: NDArray[np.float64]) -> tuple[float, float]:
-    """95 % interval of the mean over seeds (Student's t)."""
+    """Return the 95 % interval of the mean over seeds (Student's t)."""
     half = t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values))
     return values.mean() - half, values.mean() + half
 

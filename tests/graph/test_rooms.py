@@ -1,4 +1,4 @@
-"""Who may import whom, and who may know the truth."""
+"""Which package may import which, and which nodes may know the truth."""
 
 import ast
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ OURS = set(MAY_IMPORT)
 
 
 def imported(path: Path) -> set[str]:
-    """Full names of all that a file imports, wherever in the file."""
+    """Return the full names of all imports of a file, at any level."""
     names: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
@@ -36,12 +36,12 @@ def imported(path: Path) -> set[str]:
     return names
 
 
-def test_every_package_has_its_room():
+def test_every_package_has_its_rule():
     assert {path.name for path in SOURCES.iterdir() if path.is_dir()} == OURS
 
 
 def imports_of(package: str) -> Iterator[tuple[Path, str]]:
-    """Every import of a package: the file (relative to ros2_ws/src) and the full name."""
+    """Yield every import of a package: the file (relative to ros2_ws/src) and the full name."""
     for path in sorted((SOURCES / package / package).rglob('*.py')):
         for name in sorted(imported(path)):
             yield path.relative_to(SOURCES), name
@@ -59,7 +59,7 @@ def test_imports_run_downward(package):
 
 @pytest.mark.parametrize('package', sorted(OURS))
 def test_core_is_free_of_ros(package):
-    """Neither rclpy nor messages, and of our packages only their core."""
+    """A core imports neither rclpy nor messages, and of our packages only their core."""
     wrong = []
     for path, name in imports_of(package):
         top, *rest = name.split('.')
@@ -71,7 +71,7 @@ def test_core_is_free_of_ros(package):
 
 
 @pytest.mark.parametrize('package', sorted(OURS))
-def test_nobody_imports_a_node(package):
+def test_no_package_imports_a_node(package):
     wrong = [
         (path, name)
         for path, name in imports_of(package)
@@ -82,24 +82,24 @@ def test_nobody_imports_a_node(package):
 
 
 @pytest.mark.parametrize('package', ['ja_perception', 'ja_control', 'ja_learning'])
-def test_the_robot_is_never_told(package):
-    telling = ('truth', 'score')
+def test_the_robot_never_knows_the_truth(package):
+    forbidden = ('truth', 'score')
     wrong = [
         (path, name)
         for path, name in imports_of(package)
-        if any(word in name.lower() for word in telling)
+        if any(word in name.lower() for word in forbidden)
     ]
     assert not wrong
 
 
-def test_only_the_scorer_hears_the_truth(ros_context):
-    """In the running graph, whatever the code says."""
+def test_only_the_scorer_subscribes_to_the_truth(ros_context):
+    """The running graph is tested here, not the source code."""
     nodes = [
         spec.load()(context=ros_context, cli_args=spec.ros_arguments())
         for spec in [*sim_graph(), *rig_graph(str(Path(__file__).parent))]
         if spec.executable != 'camera'
     ]
-    hearers = {
+    subscribers = {
         node.get_name()
         for node in nodes
         for topic, _ in node.get_subscriber_names_and_types_by_node(
@@ -109,4 +109,4 @@ def test_only_the_scorer_hears_the_truth(ros_context):
     }
     for node in nodes:
         node.destroy_node()
-    assert hearers == {'scorer'}
+    assert subscribers == {'scorer'}

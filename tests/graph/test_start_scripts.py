@@ -6,12 +6,14 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from urllib.error import URLError
 from urllib.request import urlopen
 
 import cv2
 import numpy as np
+import psutil
 import pytest
 
 from ja_learning.core.checkpoint import load_checkpoint
@@ -30,13 +32,19 @@ def start(folder: Path, *args: str, view: bool = False) -> subprocess.Popen:
 
 
 def processes_of(parent: int) -> list[int]:
-    return list(map(int, Path(f'/proc/{parent}/task/{parent}/children').read_text().split()))
+    """Return the ids of the processes that a process has started."""
+    return [child.pid for child in psutil.Process(parent).children()]
 
 
 def named(pids: list[int]) -> dict[str, int]:
-    """Process ids by the module of their node; one that just begins or ends has no name."""
-    commands = {pid: Path(f'/proc/{pid}/cmdline').read_text().split('\0') for pid in pids}
-    return {command[3]: pid for pid, command in commands.items() if len(command) > 3}
+    """Return process ids by the module of their node; one that starts or ends has no name."""
+    modules = {}
+    for pid in pids:
+        with suppress(psutil.Error):
+            command = psutil.Process(pid).cmdline()
+            if len(command) > 3:
+                modules[command[3]] = pid
+    return modules
 
 
 def logs(folder: Path) -> str:
@@ -93,7 +101,7 @@ def trials_learned(run: Path) -> int:
 
 
 def wait_for_log(folder: Path, process: subprocess.Popen, timeout_s: float = 30.0) -> list[int]:
-    """Until every node of the graph runs as a process; their ids."""
+    """Wait until every node of the graph runs as a process; return their ids."""
     end = time.monotonic() + timeout_s
     while (
         len(list(folder.glob('runs/*/log/*.log'))) < 7 or len(named(processes_of(process.pid))) < 7
@@ -112,7 +120,7 @@ def test_a_signal_ends_the_demo_cleanly_even_while_it_starts(number, tmp_path):
     output, _ = process.communicate(timeout=30)
     assert process.returncode == 0, output
     assert 'Traceback' not in output + logs(tmp_path)
-    assert not [pid for pid in pids if Path(f'/proc/{pid}').exists()]
+    assert not [pid for pid in pids if psutil.pid_exists(pid)]
 
 
 def test_a_killed_node_ends_the_demo_with_its_name(tmp_path):
@@ -123,7 +131,7 @@ def test_a_killed_node_ends_the_demo_with_its_name(tmp_path):
     assert process.returncode == 1
     assert 'learning_module was killed by SIGKILL' in output
     assert 'Traceback' not in output + logs(tmp_path)
-    assert not [pid for pid in pids if Path(f'/proc/{pid}').exists()]
+    assert not [pid for pid in pids if psutil.pid_exists(pid)]
 
 
 def test_a_bad_parameter_file_gives_one_clear_error(tmp_path):

@@ -1,4 +1,4 @@
-"""Configuration as dataclasses: what is refused, and in which words."""
+"""Configuration dataclasses: which values are refused, and with which message."""
 
 import re
 from dataclasses import dataclass, fields, replace
@@ -77,7 +77,7 @@ def test_bad_value_is_refused_in_one_sentence(name, value, message):
         Config(**{name: value})
 
 
-def test_parameter_without_a_default_is_a_fault_of_the_programmer():
+def test_parameter_without_a_default_is_a_type_error():
     @dataclass
     class Bare:
         value: float
@@ -109,7 +109,7 @@ def test_fields_are_checked_one_by_one_and_then_together():
     assert Span(note=None).note is None
     with pytest.raises(ConfigError, match=r'^low = -2\.0 is outside the range -1\.0 to 1\.0$'):
         Span(low=-2, high=-3)
-    with pytest.raises(ConfigError, match='^low must stay below high$'):
+    with pytest.raises(ConfigError, match=r'^low must stay below high$'):
         replace(Span(), low=0.5)
 
 

@@ -1,4 +1,4 @@
-"""Which of the things seen is the target, which the caregiver."""
+"""Which detection is the target, and which the caregiver."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Detections on the wire, and tables whoever wrote them."""
+"""Detections on the wire, and tables of any writer."""
 
 import array
 

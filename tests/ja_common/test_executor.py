@@ -1,4 +1,4 @@
-"""The executor that keeps its wait set: it serves all that rclpy's serves."""
+"""The executor that keeps its wait set serves all that rclpy's serves."""
 
 from collections.abc import Iterator
 
@@ -32,8 +32,8 @@ def node(executor: CachedWaitSetExecutor, ros_context: Context) -> Node:
 
 
 def test_messages_timers_and_services_are_served(executor, node):
-    heard, beats = [], []
-    node.create_subscription(Int32, 'number', lambda message: heard.append(message.data), 10)
+    received, beats = [], []
+    node.create_subscription(Int32, 'number', lambda message: received.append(message.data), 10)
     publisher = node.create_publisher(Int32, 'number', 10)
     node.create_timer(0.01, lambda: beats.append(len(beats)))
 
@@ -44,50 +44,50 @@ def test_messages_timers_and_services_are_served(executor, node):
     node.create_service(Trigger, 'ask', answer)
     client = node.create_client(Trigger, 'ask')
     spin_until(executor, client.service_is_ready)
-    future, told = client.call_async(Trigger.Request()), []
-    future.add_done_callback(lambda done: told.append(done.result().message))
+    future, texts = client.call_async(Trigger.Request()), []
+    future.add_done_callback(lambda done: texts.append(done.result().message))
     for number in range(5):
         publisher.publish(Int32(data=number))
-    spin_until(executor, lambda: len(heard) == 5 and len(beats) > 3 and told)
-    assert heard == [0, 1, 2, 3, 4]
-    assert told == ['here']
+    spin_until(executor, lambda: len(received) == 5 and len(beats) > 3 and texts)
+    assert received == [0, 1, 2, 3, 4]
+    assert texts == ['here']
 
 
-def test_what_a_callback_makes_or_destroys_is_noticed(executor, node):
-    heard, beats = [], []
+def test_entity_that_a_callback_makes_or_destroys_is_noticed(executor, node):
+    received, beats = [], []
 
     def begin() -> None:
         node.destroy_timer(timer)
         beats.append('begin')
-        node.create_subscription(Int32, 'late', lambda message: heard.append(message.data), 10)
+        node.create_subscription(Int32, 'late', lambda message: received.append(message.data), 10)
 
     timer = node.create_timer(0.001, begin)
     publisher = node.create_publisher(Int32, 'late', 10)
     spin_until(executor, publisher.get_subscription_count)
     publisher.publish(Int32(data=7))
-    spin_until(executor, lambda: heard)
-    assert heard == [7]
+    spin_until(executor, lambda: received)
+    assert received == [7]
     assert beats == ['begin']
 
 
 def test_a_node_may_come_and_go(executor, node, ros_context):
-    heard = []
+    received = []
     publisher = node.create_publisher(Int32, 'number', 10)
     guest = rclpy.create_node('guest', context=ros_context)
-    guest.create_subscription(Int32, 'number', lambda message: heard.append(message.data), 10)
+    guest.create_subscription(Int32, 'number', lambda message: received.append(message.data), 10)
     executor.add_node(guest)
     spin_until(executor, publisher.get_subscription_count)
     publisher.publish(Int32(data=1))
-    spin_until(executor, lambda: heard)
+    spin_until(executor, lambda: received)
     executor.remove_node(guest)
     publisher.publish(Int32(data=2))
     for _ in range(10):
         executor.spin_once(timeout_sec=0.01)
-    assert heard == [1]
+    assert received == [1]
     guest.destroy_node()
 
 
-def test_messages_are_served_in_the_order_in_which_they_were_said(executor, node):
+def test_messages_are_served_in_the_order_in_which_they_were_published(executor, node):
     names, order = ['bravo', 'charlie', 'alpha'], []
     publishers = {}
     for name in sorted(names):
@@ -127,19 +127,19 @@ def test_the_end_of_the_context_ends_the_spinning(executor, node, ros_context):
 
 
 def test_a_service_is_served_while_messages_follow_each_other(executor, node):
-    heard = []
+    received = []
 
-    def say_another(message: Int32) -> None:
-        heard.append(message.data)
+    def publish_another(message: Int32) -> None:
+        received.append(message.data)
         publisher.publish(Int32(data=message.data + 1))
 
-    node.create_subscription(Int32, 'number', say_another, 10)
+    node.create_subscription(Int32, 'number', publish_another, 10)
     publisher = node.create_publisher(Int32, 'number', 10)
     node.create_service(Trigger, 'ask', lambda _, response: response)
     client = node.create_client(Trigger, 'ask')
     spin_until(executor, client.service_is_ready)
     publisher.publish(Int32(data=0))
-    spin_until(executor, lambda: len(heard) > 100)
+    spin_until(executor, lambda: len(received) > 100)
     answered = client.call_async(Trigger.Request())
     spin_until(executor, answered.done)
-    assert heard == list(range(len(heard)))
+    assert received == list(range(len(received)))

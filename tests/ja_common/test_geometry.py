@@ -1,4 +1,4 @@
-"""Rays, directions and postures: signs by hand, and there and back again."""
+"""Rays, directions and postures: signs by hand, and conversions there and back."""
 
 import math
 

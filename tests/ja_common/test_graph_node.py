@@ -1,4 +1,4 @@
-"""The base of every node: bad input is one clear error, silence is explained, the end is clean."""
+"""The base of every node: one clear error for bad input, reasons of silence, a clean end."""
 
 import os
 import signal
@@ -17,7 +17,7 @@ from node_bench import joint_state
 
 
 class Listener(GraphNode):
-    """Hears fixations; what its callbacks do is the test's."""
+    """Subscribes to fixations; each test sets what its callbacks do."""
 
     on_fixation = staticmethod(lambda message: None)
     on_call = staticmethod(lambda request, response: response)
@@ -55,7 +55,7 @@ def fail(error):
         (KeyError('oops'), "/fixation: KeyError: 'oops'"),
     ],
 )
-def test_node_outlives_bad_input_and_says_it_once(bench, capfd, error, text):
+def test_node_survives_bad_input_and_logs_it_once(bench, capfd, error, text):
     bench.node.on_fixation = fail(error)
     for stamp_ns in (1, 2, 3):
         bench.publish(FIXATION, joint_state(stamp_ns))
@@ -69,7 +69,7 @@ def test_node_outlives_bad_input_and_says_it_once(bench, capfd, error, text):
     bench.wait(lambda: bench.node.got)
 
 
-def test_diagnostics_tell_name_level_and_figures_at_one_hertz(bench):
+def test_diagnostics_hold_name_level_and_figures_at_one_hertz(bench):
     bench.node.on_fixation = fail(ValueError('the ray is bent'))
     bench.publish(FIXATION, joint_state(1))
     bench.wait(lambda: bench.complaint() != 'OK')
@@ -82,7 +82,7 @@ def test_diagnostics_tell_name_level_and_figures_at_one_hertz(bench):
 
 def test_silence_is_explained_by_the_quality_of_service(make_bench):
     bench = make_bench(Listener, subscribes=[DIAGNOSTICS])
-    bench.wait_for_complaint('no message on /fixation for more than 0.15 s: nobody publishes it')
+    bench.wait_for_complaint('no message on /fixation for more than 0.15 s: no node publishes it')
     lossy = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     bench.peer.create_publisher(FIXATION.type, FIXATION.name, lossy)
     bench.wait_for_complaint(
@@ -91,16 +91,16 @@ def test_silence_is_explained_by_the_quality_of_service(make_bench):
     )
 
 
-def test_silence_of_a_publisher_that_says_nothing_and_its_end(bench):
-    bench.wait_for_complaint('peer is its publisher, but says nothing')
+def test_silence_of_a_publisher_is_reported_until_it_publishes(bench):
+    bench.wait_for_complaint('peer is its publisher, but sends nothing')
     reports = len(bench.messages(DIAGNOSTICS))
 
-    def speaking_helps():
+    def silence_is_over():
         bench.publish(FIXATION, joint_state(1))
-        said = [d.status[0].message for d in bench.messages(DIAGNOSTICS)[reports:]]
-        return any('says nothing' not in message for message in said)
+        texts = [d.status[0].message for d in bench.messages(DIAGNOSTICS)[reports:]]
+        return any('sends nothing' not in message for message in texts)
 
-    bench.wait(speaking_helps)
+    bench.wait(silence_is_over)
 
 
 @pytest.mark.parametrize(
@@ -111,15 +111,15 @@ def test_silence_of_a_publisher_that_says_nothing_and_its_end(bench):
         (KeyError('oops'), "KeyError: 'oops'"),
     ],
 )
-def test_service_answers_what_went_wrong(bench, error, text):
+def test_service_responds_with_the_error(bench, error, text):
     bench.node.on_call = fail(error)
     response = bench.call(Trigger, 'do')
     assert not response.success
     assert response.message == text
 
 
-def test_sensor_of_any_reliability_is_heard(make_bench):
-    """A camera driver speaks best-effort, a rig reliably."""
+def test_sensor_of_any_reliability_is_received(make_bench):
+    """A camera driver publishes best-effort, a rig reliably."""
 
     class Sensing(GraphNode):
         def __init__(self, **node_kwargs):
@@ -132,12 +132,12 @@ def test_sensor_of_any_reliability_is_heard(make_bench):
     lossy = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     joints = bench.peer.create_publisher(JOINT_STATES.type, JOINT_STATES.name, lossy)
 
-    def heard_both():
+    def received_both():
         bench.publish(IMAGE, IMAGE.type())
         joints.publish(joint_state(1))
         return bench.node.got == {'image', 'joints'}
 
-    bench.wait(heard_both)
+    bench.wait(received_both)
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ class Config(Configuration):
 
 
 class Configured(GraphNode):
-    """Sends itself a signal once it spins."""
+    """Sends a signal to its own process once it spins."""
 
     def __init__(self):
         super().__init__('configured')
@@ -160,7 +160,7 @@ def test_main_ends_quietly_on_a_signal(domain, capfd):
     assert capfd.readouterr().err == ''
 
 
-def test_main_ends_quietly_when_asked_to_stop_while_the_node_is_made(domain, capfd):
+def test_main_ends_quietly_when_stopped_while_the_node_is_made(domain, capfd):
     def make_node():
         rclpy.shutdown()  # as SIGINT does
         return Configured()
@@ -193,7 +193,7 @@ def test_main_refuses_bad_arguments_in_one_line(domain, capfd, args, text):
         spin_node(Configured, ['--ros-args', *args])
     assert ended.value.code == 2
     lines = capfd.readouterr().err.splitlines()
-    (error,) = [line for line in lines if '[rcl' not in line]  # rcl logs on its own account
+    (error,) = [line for line in lines if '[rcl' not in line]  # rcl logs lines of its own
     assert error.startswith('error: ')
     assert text in error
     assert not rclpy.ok()

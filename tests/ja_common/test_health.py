@@ -3,9 +3,9 @@
 from ja_common.core.health import Health, Level
 
 
-def test_healthy_node_says_ok_and_how_much_it_hears():
+def test_healthy_node_reports_ok_and_counts_of_messages():
     health = Health(now_s=100.0)
-    health.expect('/image', every_s=1.0)
+    health.watch_input('/image', every_s=1.0)
     for i in range(20):
         health.record_message('/image', 100.0 + i / 10)
     health.values['trials'] = '7'
@@ -19,36 +19,36 @@ def test_healthy_node_says_ok_and_how_much_it_hears():
 
 def test_silence_is_noticed_after_the_last_message_and_later_before_the_first():
     health = Health(now_s=0.0)
-    health.expect('/image', every_s=1.0)
-    health.expect('/sometimes', every_s=None)
-    assert health.silent(2.9) == {}, 'others may still be starting'
-    assert health.silent(3.1) == {'/image': 3.0}
+    health.watch_input('/image', every_s=1.0)
+    health.watch_input('/sometimes', every_s=None)
+    assert health.silent_inputs(2.9) == {}, 'others may still be starting'
+    assert health.silent_inputs(3.1) == {'/image': 3.0}
     health.record_message('/image', 3.2)
-    assert health.silent(4.1) == {}
-    assert health.silent(4.3) == {'/image': 1.0}
+    assert health.silent_inputs(4.1) == {}
+    assert health.silent_inputs(4.3) == {'/image': 1.0}
 
 
 def test_problem_is_news_once_until_it_changes_or_comes_back():
     health = Health(now_s=0.0, error_memory_s=5.0)
-    assert health.problem('/image', 'no data', 1.0)
-    assert not health.problem('/image', 'no data', 2.0)
-    assert health.problem('/image', 'odd width', 3.0)
-    assert health.problem('/image', 'odd width', 8.1), 'after a quiet time it is news again'
+    assert health.record_problem('/image', 'no data', 1.0)
+    assert not health.record_problem('/image', 'no data', 2.0)
+    assert health.record_problem('/image', 'odd width', 3.0)
+    assert health.record_problem('/image', 'odd width', 8.1), 'after a quiet time it is news again'
 
 
 def test_report_has_the_worst_level_and_every_message_until_they_fade():
     health = Health(now_s=0.0, error_memory_s=5.0)
-    health.problem('a', 'slow', 1.0, Level.WARN)
-    health.problem('b', 'broken', 3.0, Level.ERROR)
+    health.record_problem('a', 'slow', 1.0, Level.WARN)
+    health.record_problem('b', 'broken', 3.0, Level.ERROR)
     report = health.report(4.0)
     assert (report.level, report.message) == (Level.ERROR, 'slow; broken')
     assert health.report(7.0).message == 'broken'
     assert health.report(9.0).level is Level.OK
 
 
-def test_resolved_problem_is_gone_at_once():
+def test_cleared_problem_is_gone_at_once():
     health = Health(now_s=0.0)
-    health.problem('a', 'slow', 1.0)
-    health.resolved('a')
-    health.resolved('never happened')
+    health.record_problem('a', 'slow', 1.0)
+    health.clear_problem('a')
+    health.clear_problem('never occurred')
     assert health.report(1.0).level is Level.OK

@@ -1,4 +1,4 @@
-"""Images of every camera's encoding, as bytes on the wire, against pictures known beforehand."""
+"""Images of every camera encoding, as bytes on the wire, against known pictures."""
 
 import cv2
 import numpy as np

@@ -30,7 +30,7 @@ def test_rig_with_names_and_signs_of_its_own():
     assert inverted_pan.decode(PLAIN.encode(Header(), (0.1, 0.2))) == pytest.approx((-0.1, 0.2))
 
 
-def test_nothing_to_say_is_a_message_without_names():
+def test_empty_message_has_no_names():
     message = PLAIN.encode(Header(), None)
     assert not message.name
     assert not message.position

@@ -1,4 +1,4 @@
-"""The success curve, counted by hand, and what is left of it on disk."""
+"""The success curve, counted by hand, and its files."""
 
 import csv
 
@@ -14,10 +14,10 @@ from ja_common.core.learning_curve import LearningCurve
 def curve() -> LearningCurve:
     curve = LearningCurve()
     curve.stage = 'exam before'
-    curve.add(False, 1.0, 0.5)
+    curve.record_trial(False, 1.0, 0.5)
     curve.stage = 'practice'
     for number, success in enumerate([True, True, False, True], start=1):
-        curve.add(success, 0.1 * number, float(number))
+        curve.record_trial(success, 0.1 * number, float(number))
     return curve
 
 
@@ -47,7 +47,7 @@ def test_png_shows_what_was_learned(curve, tmp_path):
     picture = cv2.imread(str(draw_png(curve, tmp_path, window=2)))
     better = LearningCurve()
     for _ in range(5):
-        better.add(True, 0.5, 1.0)
+        better.record_trial(True, 0.5, 1.0)
     other = cv2.imread(str(draw_png(better, tmp_path, window=2)))
     assert picture.shape == other.shape
     assert np.abs(picture.astype(int) - other).mean() > 0.1

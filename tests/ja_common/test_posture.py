@@ -1,4 +1,4 @@
-"""The posture at an image's stamp: interpolated, never the newest; nothing waits for ever."""
+"""The posture at an image's stamp: interpolated, never the newest; no item waits for ever."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ MS = 1_000_000
 
 
 def history(*samples, **options):
-    """A history of (milliseconds, pan) samples."""
+    """Return a history of (milliseconds, pan) samples."""
     kept = PostureHistory(**options)
     for ms, pan in samples:
         kept.record_posture(ms * MS, (pan, 0.0))
@@ -133,7 +133,7 @@ def test_items_behind_one_whose_handling_fails_still_wait():
     join = PostureJoin(kept)
     join.queue_item(105 * MS, 'breaks')
     join.queue_item(110 * MS, 'next')
-    next(iter(join.pop_ready()))  # its handler raised: nobody asks this iterator again
+    next(iter(join.pop_ready()))  # its handler raised: this iterator is not asked again
     assert given_now(join) == [('next', 110)]
 
 

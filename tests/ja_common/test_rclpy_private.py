@@ -57,7 +57,7 @@ def test_errors_of_rcl_are_run_time_errors_of_their_own():
     context = Context()
     with pytest.raises(UnknownROSArgsError, match='unknown'):
         rclpy.init(args=['--ros-args', '--unknown'], context=context)
-    with pytest.raises(RCLError, match='^failed to initialize rcl: .*, at '):
+    with pytest.raises(RCLError, match=r'^failed to initialize rcl: .*, at '):
         rclpy.init(args=['--ros-args', '-p', 'x'], context=context)
 
 
@@ -150,15 +150,15 @@ def test_wait_set_finds_what_is_ready_of_each_kind(executor, node, ros_context):
 
 @pytest.mark.parametrize('with_information', [False, True])
 def test_message_is_taken_with_the_time_of_its_publishing(node, ros_context, with_information):
-    heard = []
+    received = []
     if with_information:
 
         def callback(message: Int32, information: dict) -> None:
-            heard.append((message.data, information['source_timestamp']))
+            received.append((message.data, information['source_timestamp']))
     else:
 
         def callback(message: Int32) -> None:
-            heard.append(message.data)
+            received.append(message.data)
 
     subscription = node.create_subscription(Int32, 'number', callback, 10)
     assert subscription._callback_type in Subscription.CallbackType
@@ -171,7 +171,7 @@ def test_message_is_taken_with_the_time_of_its_publishing(node, ros_context, wit
     ((stamp_ns, call),) = take_message(subscription)
     assert before_ns <= stamp_ns <= node.get_clock().now().nanoseconds
     call()
-    assert heard == [(7, stamp_ns) if with_information else 7]
+    assert received == [(7, stamp_ns) if with_information else 7]
     node.destroy_subscription(subscription)
     assert take_message(subscription) == []
 

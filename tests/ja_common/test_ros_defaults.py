@@ -1,11 +1,11 @@
-"""The ROS defaults of every entry point: set where the user is silent."""
+"""The ROS defaults of every entry point: set where the user has set nothing."""
 
 import xml.etree.ElementTree as ElementTree
 
 from ja_common.ros_defaults import ENVIRONMENT, LEASE_S, PROFILE, apply_ros_defaults
 
 
-def test_silent_user_gets_every_default():
+def test_without_settings_of_the_user_every_default_is_set():
     environ = {}
     apply_ros_defaults(environ)
     assert environ == ENVIRONMENT

@@ -1,4 +1,4 @@
-"""The complete set for one image, whatever the order in which it comes."""
+"""The complete set for one image, in any order of arrival."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from ja_common.core.stamp_join import StampJoin
 def test_set_is_complete_with_the_last_key():
     join = StampJoin(['a', 'b', 'c'])
     assert join.collect_value('c', 1, 'C') is None
-    assert join.collect_value('a', 1, None) is None, 'None is a value: nothing to say'
+    assert join.collect_value('a', 1, None) is None, 'None is a value'
     assert join.collect_value('b', 1, 'B') == {'a': None, 'b': 'B', 'c': 'C'}
 
 
@@ -26,7 +26,7 @@ def test_sets_older_than_a_complete_one_are_dropped():
     join.collect_value('a', 2, 'new')
     join.collect_value('b', 2, 'new')
     assert join.collect_value('b', 1, 'old') is None
-    assert join.missing() == {'a'}, 'a straggler begins a set that nobody completes'
+    assert join.missing() == {'a'}, 'a late value begins a set that stays incomplete'
 
 
 def test_repeated_image_gives_a_set_again():

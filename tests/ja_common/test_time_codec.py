@@ -1,4 +1,4 @@
-"""Stamps go through unchanged, to the last nanosecond."""
+"""Stamps stay unchanged, to the last nanosecond."""
 
 import pytest
 

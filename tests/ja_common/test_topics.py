@@ -22,7 +22,7 @@ def test_names_are_relative_so_that_namespaces_work(topic):
 
 
 @by_name
-def test_who_hears_matches_who_says(topic):
+def test_subscriber_matches_publisher(topic):
     compatibility, reason = qos_check_compatible(topic.publisher_qos, topic.subscriber_qos)
     assert compatibility is not QoSCompatibility.ERROR, reason
     assert topic.subscriber_qos.history is HistoryPolicy.KEEP_LAST
@@ -30,7 +30,7 @@ def test_who_hears_matches_who_says(topic):
 
 @pytest.mark.parametrize('topic', [IMAGE, JOINT_STATES], ids=lambda topic: topic.name)
 @pytest.mark.parametrize('driver', [best_effort_camera, reliable_camera])
-def test_any_driver_is_heard(topic, driver):
+def test_any_driver_is_received(topic, driver):
     assert qos_check_compatible(driver, topic.subscriber_qos)[0] is not QoSCompatibility.ERROR
 
 

@@ -1,4 +1,4 @@
-"""The attention cycle, trial after trial, in a world that is nothing but angles."""
+"""The attention cycle, trial after trial, in a world of angles only."""
 
 from collections import deque
 from dataclasses import replace
@@ -25,7 +25,7 @@ CONFIG = AttentionCycleConfig()
 class AngleWorld:
     """A head of limited speed (and dead time), the caregiver's face, and objects, as directions.
 
-    `learner` is what the learning module proposes at a posture. Objects are given most salient
+    `learner` is what the learning module proposes at a posture. The most salient object comes
     first.
     """
 
@@ -51,7 +51,7 @@ class AngleWorld:
         )
 
     def obey(self, target):
-        """One image's time passes."""
+        """Advance by the time of one image."""
         self._orders.append(np.array(target))
         reach = self._speed * PERIOD_S
         way = np.clip(self._orders.popleft() - self.position, -reach, reach)
@@ -69,7 +69,7 @@ def make_cycle(p_lm=0.0, seed=0, **config):
 
 
 def run(cycle, world, images):
-    """Let the cycle drive the world; [(percept, decision)] of every image."""
+    """Let the cycle drive the world; return [(percept, decision)] of every image."""
     rounds = []
     for _ in range(images):
         percept = world.percept()
@@ -80,7 +80,7 @@ def run(cycle, world, images):
 
 
 def phases(rounds):
-    """The phases in the order in which they came, each run once."""
+    """Return the phases in their order, each run of equal ones once."""
     found = [decision.phase for _, decision in rounds]
     return [p for i, p in enumerate(found) if i == 0 or p is not found[i - 1]]
 
@@ -135,7 +135,7 @@ def test_visual_feedback_stands_in_while_the_learner_has_no_answer():
 
 
 def shifts_by_learner(**config):
-    """Trials of five shifts each without any fixation, shape (trials, 5): did the LM lead?"""
+    """Return whether the LM led each shift of trials without fixation, (trials, 5)."""
     world = AngleWorld(objects=[])
     world.learner = lambda posture: np.zeros(2)
     cycle = make_cycle(p_lm=0.3, max_shifts=5, dwell_s=0.0, **config)
@@ -184,8 +184,8 @@ def test_trial_without_fixation_is_given_up_after_max_shifts():
 
 
 @pytest.mark.parametrize('dead_images', [0, 1, 4])
-def test_shift_is_never_judged_arrived_before_the_head_has_moved(dead_images):
-    """While the servo has not begun, the head stands still, and on the wrong object."""
+def test_shift_has_not_arrived_before_the_head_has_moved(dead_images):
+    """Before the servo starts, the head stands still, and on the wrong object."""
     world = AngleWorld(objects=[(0.25, 0.0), (0.09, 0.0)], dead_images=dead_images)
     cycle = make_cycle(settle_timeout_s=3.0)
     rounds = run(cycle, world, 30)
@@ -195,13 +195,12 @@ def test_shift_is_never_judged_arrived_before_the_head_has_moved(dead_images):
     assert not percept.posture.velocity.any()
 
 
-def test_shift_that_cannot_arrive_is_judged_after_the_settle_timeout():
+def test_shift_that_cannot_arrive_ends_after_the_settle_timeout():
     world = AngleWorld(objects=[])
     world.learner = lambda posture: np.array([0.5, 0.0])
     cycle = make_cycle(p_lm=1.0, settle_timeout_s=0.8)
     rounds = run(cycle, world, 5)
-    stuck = [cycle.step(world.percept())]
-    assert stuck[0].phase is Phase.SHIFT
+    assert cycle.step(world.percept()).phase is Phase.SHIFT
     start = next(p.posture.stamp_ns for p, d in rounds if d.phase is Phase.SHIFT)
     world.position, world.velocity = np.array([0.1, 0.0]), np.zeros(2)  # against a wall
     while (decision := cycle.step(world.percept())).shifts == 0:
@@ -210,7 +209,7 @@ def test_shift_that_cannot_arrive_is_judged_after_the_settle_timeout():
     assert decision.target == pytest.approx((0.6, 0.0)), 'the next shift starts where it stands'
 
 
-def test_shift_aimed_outside_the_limits_has_arrived_where_they_end():
+def test_shift_to_a_target_outside_the_limits_has_arrived_where_they_end():
     world = AngleWorld(objects=[])
     world.learner = lambda posture: np.array([0.5, 0.0])
     config = replace(CONFIG, settle_timeout_s=30.0)
@@ -260,7 +259,7 @@ def test_head_looks_where_the_face_was_before_it_searches():
 
 
 def test_blink_of_the_detector_is_no_dwelling():
-    """A face that is missed and seen again must be dwelt on anew."""
+    """The dwell time starts from zero when a missed face comes back."""
     world = AngleWorld(objects=[(0.25, 0.0)])
     cycle = make_cycle(dwell_s=0.3, search_after_s=1.0)
     run(cycle, world, 2)
@@ -284,11 +283,11 @@ def test_moving_caregiver_is_followed():
     for _ in range(30):
         world.face = world.face + np.array([0.05, 0.0])
         run(cycle, world, 1)
-    assert cycle.phase is Phase.LOOK, 'never still, so never dwelt on'
+    assert cycle.phase is Phase.LOOK, 'never still, so no dwell'
     assert world.position == pytest.approx(world.face)
 
 
-def test_home_gives_up_the_trial_and_looks_from_there():
+def test_home_ends_the_trial_and_looks_from_there():
     world = AngleWorld(objects=[(0.25, 0.0)])
     cycle = make_cycle(home_pan_rad=-0.3, home_tilt_rad=0.1)
     run(cycle, world, 4)
@@ -302,7 +301,7 @@ def test_home_gives_up_the_trial_and_looks_from_there():
     assert cycle.trials == 0
 
 
-def test_restart_gives_up_the_shift_and_looks_where_the_caregiver_was():
+def test_restart_ends_the_shift_and_looks_where_the_caregiver_was():
     world = AngleWorld(objects=[(0.25, 0.0)])
     cycle = make_cycle()
     run(cycle, world, 4)
@@ -314,7 +313,7 @@ def test_restart_gives_up_the_shift_and_looks_where_the_caregiver_was():
     assert decision.target == pytest.approx((0.0, 0.0))
 
 
-def test_order_to_turn_home_outlives_a_restart():
+def test_turn_home_goes_on_after_a_restart():
     cycle = make_cycle()
     cycle.go_home()
     cycle.restart()
@@ -330,7 +329,7 @@ def test_posture_is_kept_when_nothing_was_ever_seen():
 
 
 class GlancingWorld(AngleWorld):
-    """A learner that wants these views, one after the other, until the head has been there."""
+    """A learner that proposes these views, one after the other, until the head has been there."""
 
     def __init__(self, views, **world):
         super().__init__(**world)
@@ -343,7 +342,7 @@ class GlancingWorld(AngleWorld):
         return replace(percept, glance_delta=wanted)
 
 
-def test_the_views_that_are_wanted_are_taken_before_the_first_shift():
+def test_proposed_views_are_taken_before_the_first_shift():
     world = GlancingWorld([(0.4, 0.0), (-0.4, 0.0)], objects=[(0.1, 0.1)])
     rounds = run(make_cycle(), world, 40)
     assert phases(rounds)[:3] == [Phase.LOOK, Phase.GLANCE, Phase.SHIFT]
@@ -353,7 +352,7 @@ def test_the_views_that_are_wanted_are_taken_before_the_first_shift():
     assert {d.source for _, d in rounds if d.phase is Phase.GLANCE} == {Source.GLANCE}
 
 
-def test_what_is_fixated_in_a_glance_ends_nothing():
+def test_fixation_in_a_glance_does_not_end_the_trial():
     world = GlancingWorld([(0.4, 0.0), (-0.4, 0.0)], objects=[(0.4, 0.02), (-0.4, 0.0)])
     rounds = run(make_cycle(), world, 40)
     glancing = [d for p, d in rounds if d.phase is Phase.GLANCE and p.fixation is not None]
@@ -362,23 +361,23 @@ def test_what_is_fixated_in_a_glance_ends_nothing():
 
 
 @pytest.mark.parametrize(('most', 'taken'), [(0, 0), (1, 1), (3, 3)])
-def test_a_learner_that_never_has_enough_is_cut_off(most, taken):
+def test_glances_end_at_max_glances(most, taken):
     def always_more(world):
         world.views.append(world.position + np.array([0.1, 0.0]))
 
     world = GlancingWorld([(0.1, 0.0)], objects=[(0.3, 0.0)])
-    cycle, aims = make_cycle(max_glances=most), []
+    cycle, targets = make_cycle(max_glances=most), []
     for _ in range(30):
         always_more(world)
         decision = cycle.step(world.percept())
         world.obey(decision.target)
         if decision.phase is Phase.GLANCE and decision.trials == 0:
-            aims.append(tuple(decision.target))
-    assert len(set(aims)) == taken
+            targets.append(tuple(decision.target))
+    assert len(set(targets)) == taken
     assert cycle.trials >= 1
 
 
-def test_a_fixation_may_take_its_time():
+def test_gate_waits_for_a_late_fixation():
     """The evaluator answers only when the head has stood still for a while."""
 
     def shifts_of_first_trial(wait_s):

@@ -1,4 +1,4 @@
-"""`gate`: one command for every complete set of proposals; everything else holds the head."""
+"""`gate`: one command for every complete set of proposals; all else holds the head."""
 
 import math
 import time
@@ -34,13 +34,13 @@ from node_bench import header, joint_state
 
 PERIOD_NS = 100_000_000
 PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, GLANCE_DELTA, FIXATION)
-SAYS = (*PROPOSALS, EVIDENCE, JOINT_STATES, CLOCK)
+PUBLISHES = (*PROPOSALS, EVIDENCE, JOINT_STATES, CLOCK)
 FACE_RIGHT = {FACE_DELTA: (-0.5, 0.0)}
 SPEED = 2.0  # the gate's default [rad/s]
 
 
 class Graph:
-    """The rest of the graph around a gate: a clock, a head, and what the others propose."""
+    """The rest of the graph around a gate: a clock, a head, and the proposals of the others."""
 
     def __init__(self, bench):
         self.bench = bench
@@ -48,8 +48,8 @@ class Graph:
         self.pan = 0.0
         bench.wait(lambda: bench.peer.count_subscribers('/clock'))
 
-    def tell(self, proposals, stamp_ns=None, without=(), log_evidence=0.0):
-        """All topics of one image; those not in `proposals` have nothing to say."""
+    def publish_proposals(self, proposals, stamp_ns=None, without=(), log_evidence=0.0):
+        """Publish all topics of one image; those not in `proposals` carry no proposal."""
         stamp_ns = self.stamp_ns if stamp_ns is None else stamp_ns
         evidence = {'log_evidence': [log_evidence]}
         self.bench.publish(EVIDENCE, encode_columns(header(stamp_ns), evidence))
@@ -58,38 +58,38 @@ class Graph:
                 self.bench.publish(topic, joint_state(stamp_ns, *proposals.get(topic, ())))
 
     def image(self, proposals=FACE_RIGHT, age_s=0.0, follow=True):
-        """The next image; the command that answers it, which the head obeys at once."""
+        """Publish the next image; return its command, which the head follows at once."""
         self.stamp_ns += PERIOD_NS
         self.set_clock(self.stamp_ns + int(age_s * 1e9))
         self.bench.publish_posture(self.stamp_ns, self.pan)
-        self.tell(proposals)
+        self.publish_proposals(proposals)
         command = self.answer()
         if follow:
             self.pan = command.position[0]
         return command
 
     def answer(self):
-        """The command that carries the header of the last image."""
-        asked = header(self.stamp_ns)
-        heard = self.bench.messages(JOINT_COMMANDS)
-        self.bench.wait(lambda: any(command.header == asked for command in heard))
-        return next(command for command in reversed(heard) if command.header == asked)
+        """Return the command that carries the header of the last image."""
+        wanted = header(self.stamp_ns)
+        commands = self.bench.messages(JOINT_COMMANDS)
+        self.bench.wait(lambda: any(command.header == wanted for command in commands))
+        return next(command for command in reversed(commands) if command.header == wanted)
 
     def set_clock(self, now_ns):
-        """Set /clock, and wait until the gate goes by it."""
+        """Set /clock, and wait until the gate reads it."""
         clock = self.bench.node.get_clock()
 
-        def set_and_seen():
+        def publish_and_read():
             self.bench.publish(CLOCK, Clock(clock=to_time(now_ns)))
             return clock.now().nanoseconds == now_ns
 
-        self.bench.wait(set_and_seen)
+        self.bench.wait(publish_and_read)
 
     def status(self):
-        """The status that goes with the last command."""
-        heard = self.bench.messages
-        self.bench.wait(lambda: len(heard(GATE_STATUS)) >= len(heard(JOINT_COMMANDS)))
-        status = heard(GATE_STATUS)[-1]
+        """Return the status of the last command, and its values."""
+        messages = self.bench.messages
+        self.bench.wait(lambda: len(messages(GATE_STATUS)) >= len(messages(JOINT_COMMANDS)))
+        status = messages(GATE_STATUS)[-1]
         return status, {value.key: value.value for value in status.values}
 
 
@@ -99,8 +99,8 @@ def make_graph(make_bench):
         # An acceleration that reaches full speed in one period: plain numbers to compare with.
         plain = {'lockstep': True, 'max_acceleration_rad_s2': 1e4, 'dead_zone_rad': 0.0}
         parameters = {'use_sim_time': True, **plain, **parameters}
-        hears = [JOINT_COMMANDS, GATE_STATUS]
-        return Graph(make_bench(GateNode, SAYS, hears, **parameters))
+        subscribes = [JOINT_COMMANDS, GATE_STATUS]
+        return Graph(make_bench(GateNode, PUBLISHES, subscribes, **parameters))
 
     return make
 
@@ -121,7 +121,7 @@ def test_complete_set_is_answered_by_one_command_with_the_stamp_of_the_image(gra
     assert len(graph.bench.messages(JOINT_COMMANDS)) == 2
 
 
-def test_status_tells_phase_source_and_what_was_cut(graph):
+def test_status_holds_phase_source_and_the_limit_that_cut(graph):
     graph.image()
     graph.image()
     status, values = graph.status()
@@ -136,11 +136,14 @@ def test_incomplete_set_is_not_answered(graph):
     graph.image()
     graph.stamp_ns += PERIOD_NS
     graph.bench.publish_posture(graph.stamp_ns)
-    graph.tell(FACE_RIGHT, without=[LM_DELTA])
+    graph.publish_proposals(FACE_RIGHT, without=[LM_DELTA])
     graph.bench.wait(lambda: graph.bench.received(FIXATION) == 2)
     assert len(graph.bench.messages(JOINT_COMMANDS)) == 1
     graph.bench.publish(LM_DELTA, joint_state(graph.stamp_ns))
-    graph.bench.next(JOINT_COMMANDS)
+    graph.answer()
+    graph.image()
+    # An answer to the incomplete set would have come before this one.
+    assert len(graph.bench.messages(JOINT_COMMANDS)) == 3
 
 
 def test_whole_trial_over_topics(graph):
@@ -162,7 +165,7 @@ def test_repeated_image_gets_the_identical_command(graph):
     graph.image()
     answer = graph.image()
     for _ in range(3):
-        graph.tell({FACE_DELTA: (9.0, 9.0)})
+        graph.publish_proposals({FACE_DELTA: (9.0, 9.0)})
         assert graph.bench.next(JOINT_COMMANDS) == answer
     assert graph.image().position[0] == pytest.approx(2 * answer.position[0]), 'and no step more'
 
@@ -170,7 +173,7 @@ def test_repeated_image_gets_the_identical_command(graph):
 def test_late_image_is_not_answered(graph):
     graph.image()
     graph.image()
-    graph.tell(FACE_RIGHT, stamp_ns=graph.stamp_ns - PERIOD_NS)
+    graph.publish_proposals(FACE_RIGHT, stamp_ns=graph.stamp_ns - PERIOD_NS)
     answer = graph.image()
     assert to_ns(answer.header.stamp) == graph.stamp_ns
     assert len(graph.bench.messages(JOINT_COMMANDS)) == 3
@@ -253,7 +256,7 @@ def test_command_stays_inside_the_position_limits(make_graph):
 def test_broken_proposal_is_one_clear_error_and_not_a_command(graph, message, text):
     graph.image()
     graph.stamp_ns += PERIOD_NS
-    graph.tell({}, without=[VF_DELTA])
+    graph.publish_proposals({}, without=[VF_DELTA])
     message.header = header(graph.stamp_ns)
     graph.bench.publish(VF_DELTA, message)
     graph.bench.wait_for_complaint(f'/visual_feedback/delta: {text}')
@@ -289,17 +292,17 @@ def test_parameters_of_the_running_gate(graph):
 
 
 def test_not_finite_proposals_of_every_kind_move_nothing(graph):
-    """The whole set comes, but one number in it is none: no answer, a complaint, and life."""
+    """A complete set with one number that is not finite: no answer, and one complaint."""
     graph.image()
     for topic in PROPOSALS:
         graph.stamp_ns += PERIOD_NS
-        graph.tell({topic: (math.inf, math.nan)})
+        graph.publish_proposals({topic: (math.inf, math.nan)})
         graph.bench.wait_for_complaint(f'/{topic.name}: position of')
     graph.image({})
     assert len(graph.bench.messages(JOINT_COMMANDS)) == 2
 
 
-def test_count_of_trials_outlives_the_gate(make_graph, tmp_path):
+def test_count_of_trials_is_kept_over_a_restart(make_graph, tmp_path):
     path = tmp_path / 'trials'
     path.write_text('41\n')
     graph = make_graph(trials_file=str(path), dwell_s=0.0, max_shifts=1, settle_timeout_s=0.05)
@@ -321,10 +324,10 @@ def test_heads_side_by_side_count_their_trials_apart(make_bench, tmp_path):
         make_bench(GateNode, trials_file=str(tmp_path / 'trials'))
 
 
-def test_joint_trajectory_has_one_point_to_be_taken_at_once(make_bench):
+def test_joint_trajectory_has_one_point_and_a_zero_stamp(make_bench):
     parameters = {'output': 'joint_trajectory', 'time_from_start_s': 1.25, 'lockstep': True}
-    hears = [JOINT_COMMANDS, GATE_STATUS, JOINT_TRAJECTORY]
-    bench = make_bench(GateNode, SAYS, hears, use_sim_time=True, **parameters)
+    subscribes = [JOINT_COMMANDS, GATE_STATUS, JOINT_TRAJECTORY]
+    bench = make_bench(GateNode, PUBLISHES, subscribes, use_sim_time=True, **parameters)
     graph = Graph(bench)
     graph.image()
     graph.image()
@@ -341,8 +344,8 @@ def test_joint_trajectory_has_one_point_to_be_taken_at_once(make_bench):
 def test_forward_commands_stand_in_the_order_of_the_controller(make_bench):
     parameters = {'output': 'float64_multi_array', 'joint_order': 'tilt_pan', 'lockstep': True}
     parameters |= {'pan_inverted': True, 'pan_offset_rad': 0.5, 'tilt_offset_rad': -0.25}
-    hears = [JOINT_COMMANDS, GATE_STATUS, FORWARD_COMMANDS]
-    bench = make_bench(GateNode, SAYS, hears, use_sim_time=True, **parameters)
+    subscribes = [JOINT_COMMANDS, GATE_STATUS, FORWARD_COMMANDS]
+    bench = make_bench(GateNode, PUBLISHES, subscribes, use_sim_time=True, **parameters)
     graph = Graph(bench)
     graph.pan = 0.4  # in the rig's count: 0.1 to the left of the middle
     graph.image()
@@ -359,10 +362,10 @@ URDF = """<robot name="head"><link name="base"/><link name="neck"/><link name="e
 
 
 def test_limits_of_the_robot_description(make_bench):
-    says = [*SAYS, ROBOT_DESCRIPTION]
-    hears = [JOINT_COMMANDS, GATE_STATUS]
+    publishes = [*PUBLISHES, ROBOT_DESCRIPTION]
+    subscribes = [JOINT_COMMANDS, GATE_STATUS]
     parameters = {'limits_from': 'robot_description', 'lockstep': True, 'use_sim_time': True}
-    bench = make_bench(GateNode, says, hears, max_acceleration_rad_s2=1e4, **parameters)
+    bench = make_bench(GateNode, publishes, subscribes, max_acceleration_rad_s2=1e4, **parameters)
     graph = Graph(bench)
     assert graph.image().position[0] == 0.0
     assert graph.image().position[0] == 0.0
@@ -378,17 +381,17 @@ def test_limits_of_the_robot_description(make_bench):
     assert min(commands) == pytest.approx(-0.18)
 
 
-RATE_HZ = 50.0  # of the commands; a busy machine keeps up
+RATE_HZ = 50.0  # of the commands; slow enough for a busy machine
 
 
 class RealTime:
-    """A gate on its own clock, and a head that obeys; the test plays the camera."""
+    """A gate on its own clock, and a head that follows; the test publishes the images."""
 
     def __init__(self, make_bench, **parameters):
-        says = [*PROPOSALS, EVIDENCE, JOINT_STATES]
-        hears = [JOINT_COMMANDS, GATE_STATUS]
+        publishes = [*PROPOSALS, EVIDENCE, JOINT_STATES]
+        subscribes = [JOINT_COMMANDS, GATE_STATUS]
         parameters = {'control_rate_hz': RATE_HZ, **parameters}
-        self.bench = make_bench(GateNode, says, hears, **parameters)
+        self.bench = make_bench(GateNode, publishes, subscribes, **parameters)
         self.pan = 0.0
         self._due_s = 0.0
 
@@ -402,7 +405,7 @@ class RealTime:
         self.bench.publish(EVIDENCE, encode_columns(header(stamp_ns), {'log_evidence': [0.0]}))
 
     def images(self, until, **image):
-        """Images, 30 a second, until something holds."""
+        """Publish 30 images a second until a condition holds."""
 
         def another():
             if time.monotonic() >= self._due_s:

@@ -15,7 +15,7 @@ def test_sigmoid_of_the_paper():
     assert gating.p_lm(300_000) == pytest.approx(0.9975274)
 
 
-def test_it_grows_and_never_leaves_its_limits():
+def test_sigmoid_grows_and_stays_within_its_limits():
     gating = Gating(GatingConfig(p_lm_max=0.8))
     values = [gating.p_lm(trials) for trials in range(0, 400_000, 10_000)]
     assert values == sorted(values)

@@ -1,4 +1,4 @@
-"""Position limits, and the margin that no aim enters."""
+"""Position limits, and the margin that no target enters."""
 
 import pytest
 
@@ -11,7 +11,7 @@ CONFIG = JointLimitsConfig(
 LIMITS = JointLimits(CONFIG)
 
 
-def test_posture_is_clipped_to_the_limits_and_an_aim_to_the_margin_inside():
+def test_posture_is_clipped_to_the_limits_and_a_target_to_the_margin_inside():
     assert LIMITS.clip((0.9, -3.0)) == pytest.approx((0.8, -0.5))
     assert LIMITS.reachable((0.9, -3.0)) == pytest.approx((0.75, -0.45))
     assert LIMITS.reachable((0.1, 0.2)) == pytest.approx((0.1, 0.2))

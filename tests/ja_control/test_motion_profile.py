@@ -1,4 +1,4 @@
-"""The trapezoid: as fast as the limits allow, to the aim, and never past it."""
+"""The trapezoid: as fast as the limits allow, to the target, and never past it."""
 
 import numpy as np
 import pytest
@@ -10,11 +10,11 @@ from ja_control.core.motion_profile import MotionProfile, stopping_speed
 PERIOD_S, SPEED, ACCELERATION = 0.01, 2.0, 40.0
 
 
-def run(profile, aim, periods):
-    """Positions and velocities over so many periods, each (periods,)."""
+def run(profile, target, periods):
+    """Return positions and velocities over so many periods, each (periods,)."""
     states = []
     for _ in range(periods):
-        profile.approach(aim)
+        profile.approach(target)
         states.append((profile.position, profile.velocity))
     return np.array(states).T
 
@@ -28,7 +28,7 @@ def test_braking_from_the_stopping_speed_ends_exactly_at_the_distance(distance, 
     assert way == pytest.approx(distance)
 
 
-def test_it_takes_the_time_of_a_trapezoid_and_stands_on_the_aim():
+def test_it_takes_the_time_of_a_trapezoid_and_stands_at_the_target():
     positions, velocities = run(MotionProfile(PERIOD_S, SPEED, ACCELERATION), 1.0, 80)
     ideal_s = 1.0 / SPEED + SPEED / ACCELERATION
     arrived = np.flatnonzero(np.isclose(positions, 1.0, atol=1e-12))[0]
@@ -41,13 +41,13 @@ def test_it_takes_the_time_of_a_trapezoid_and_stands_on_the_aim():
 
 def test_it_names_the_limit_that_cut_it():
     profile = MotionProfile(PERIOD_S, SPEED, ACCELERATION)
-    said = [profile.approach(1.0) for _ in range(80)]
-    assert said[0] == 'acceleration'
-    assert said[20] == 'speed'
-    assert said[-1] == ''
+    limits = [profile.approach(1.0) for _ in range(80)]
+    assert limits[0] == 'acceleration'
+    assert limits[20] == 'speed'
+    assert limits[-1] == ''
 
 
-def test_aim_that_jumps_back_is_passed_and_returned_to():
+def test_target_that_jumps_back_is_passed_and_returned_to():
     profile = MotionProfile(PERIOD_S, SPEED, ACCELERATION)
     run(profile, 1.0, 20)
     here, speed = profile.position, profile.velocity

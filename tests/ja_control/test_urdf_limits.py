@@ -1,4 +1,4 @@
-"""Limits from a URDF: the narrower hold, and what contradicts the parameters is refused."""
+"""Limits from a URDF: the narrower ones hold; contradictions are refused."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def test_limits_are_turned_with_the_sign_and_moved_with_the_offset_of_the_rig():
 
 
 def test_axis_is_that_in_the_frame_of_the_root():
-    """A tilt joint whose own z axis was laid to the left."""
+    """A tilt joint whose own z axis points to the left."""
     assert limits_of(urdf(tilt='0 0 1', rpy='-1.5707963 0 0')).tilt_min_rad == -0.5
 
 
@@ -54,6 +54,6 @@ def test_axis_is_that_in_the_frame_of_the_root():
         (urdf().replace('parent link="base"', 'parent link="eye"'), 'form a loop'),
     ],
 )
-def test_what_cannot_be_used_is_refused_in_one_sentence(text, complaint):
+def test_unusable_urdf_is_refused_in_one_sentence(text, complaint):
     with pytest.raises(ValueError, match=complaint):
         limits_of(text)

@@ -18,14 +18,14 @@ BRIGHT = Detection(Kind.OBJECT, 0.25, -0.125, 0, 0, 10, 10, 0.9)
 @pytest.fixture
 def make(make_bench):
     def make(**parameters):
-        hears = [VF_DELTA, FACE_DELTA]
-        return make_bench(VisualFeedbackControllerNode, [DETECTIONS], hears, **parameters)
+        subscribes = [VF_DELTA, FACE_DELTA]
+        return make_bench(VisualFeedbackControllerNode, [DETECTIONS], subscribes, **parameters)
 
     return make
 
 
 def answers(bench, stamp_ns, detections):
-    """The deltas to the target and to the face for one message of detections."""
+    """Return the deltas to the target and to the face for one message of detections."""
     bench.publish(DETECTIONS, encode_detections(header(stamp_ns), detections))
     bench.wait(lambda: all(stamps(bench, t)[-1:] == [stamp_ns] for t in (VF_DELTA, FACE_DELTA)))
     return bench.messages(VF_DELTA)[-1], bench.messages(FACE_DELTA)[-1]
@@ -66,7 +66,7 @@ def test_gain_is_set_while_running_and_a_bad_one_changes_nothing(make):
     assert list(answers(bench, 3, [BRIGHT])[0].position) == pytest.approx([-0.5, -0.25])
 
 
-def test_rig_with_names_and_signs_of_its_own(make):
+def test_rig_with_other_names_and_signs(make):
     bench = make(pan_joint='neck', tilt_inverted=True)
     target, _ = answers(bench, 1, [BRIGHT])
     assert list(target.name) == ['neck', 'tilt']
@@ -100,4 +100,4 @@ def test_broken_message_is_one_clear_error_and_the_node_lives_on(make, spoil, te
     bench.publish(DETECTIONS, message)
     bench.wait_for_complaint(text)
     answers(bench, 2, [BRIGHT])
-    assert stamps(bench, VF_DELTA) == [2], 'no answer to what was broken'
+    assert stamps(bench, VF_DELTA) == [2], 'no answer to the broken message'

@@ -1,4 +1,4 @@
-"""`view`: hears the graph at its own pace, and passes orders on."""
+"""`view`: polls the graph at its own rate, and passes requests on."""
 
 import math
 from dataclasses import dataclass
@@ -51,26 +51,26 @@ def bench(make_bench):
     for topic in [*WATCHED, SIM_TRUTH]:
         publisher = bench.peer.create_publisher(topic.type, topic.name, topic.publisher_qos)
         bench._publishers[topic.name] = publisher
-    wait_for_ears(bench, [GATE_STATUS, FIXATION])
+    wait_for_publishers(bench, [GATE_STATUS, FIXATION])
     return bench
 
 
-def hearers(bench, topic):
+def subscribers(bench, topic):
     return bench._publishers[topic.name].get_subscription_count()
 
 
 def watch(bench):
-    bench.node.watched()
-    bench.wait(lambda: all(hearers(bench, topic) for topic in WATCHED))
-    wait_for_ears(bench, WATCHED)
+    bench.node.note_viewer()
+    bench.wait(lambda: all(subscribers(bench, topic) for topic in WATCHED))
+    wait_for_publishers(bench, WATCHED)
 
 
-def wait_for_ears(bench, topics):
-    """The page listens best-effort: what is said before *it* knows the speaker is lost."""
-    bench.wait(lambda: all(bench.node.mailboxes[topic].publishers for topic in topics))
+def wait_for_publishers(bench, topics):
+    """Wait until the node knows the publishers: best effort loses all that comes before."""
+    bench.wait(lambda: all(bench.node.polled_subscriptions[topic].publishers for topic in topics))
 
 
-def say_image(bench, stamp_ns, detections=(FACE,)):
+def publish_image(bench, stamp_ns, detections=(FACE,)):
     head = header(stamp_ns)
     image = np.full((240, 320, 3), 90, np.uint8)
     joints = JointCodec(JointConfig())
@@ -81,27 +81,45 @@ def say_image(bench, stamp_ns, detections=(FACE,)):
     bench.publish(DETECTIONS, encode_detections(head, list(detections)))
 
 
-def test_images_are_heard_only_while_somebody_watches(bench):
-    assert not any(hearers(bench, topic) for topic in WATCHED)
-    watch(bench)
-    bench.node._watched_s = -math.inf
-    bench.wait(lambda: not any(hearers(bench, topic) for topic in WATCHED))
+def show_images(bench, is_shown, publish_more=lambda: None):
+    """Publish images until the node shows a scene as `is_shown` asks; return the stamps [ns].
+
+    One set of messages is not enough: a poll may come between two messages of a set.
+    """
+    stamps = []
+
+    def shown():
+        bench.node.note_viewer()
+        stamps.append(5_000_000_000 + len(stamps) * 10_000_000)
+        publish_more()
+        publish_image(bench, stamps[-1])
+        scene = bench.node.frame.scene
+        return scene is not None and is_shown(scene)
+
+    bench.wait(shown)
+    return stamps
 
 
-def test_an_image_is_shown_with_what_was_found_in_it(bench):
+def test_images_are_received_only_with_a_viewer(bench):
+    assert set(bench.node.polled_subscriptions) == {FIXATION, GATE_STATUS}
     watch(bench)
-    say_image(bench, 5_000_000_000)
-    # The posture may be known before the detections are.
-    bench.wait(lambda: bench.node.frame.glance and len(bench.node.frame.glance.directions))
+    bench.node._viewer_s = -math.inf
+    bench.wait(lambda: not any(subscribers(bench, topic) for topic in WATCHED))
+    assert set(bench.node.polled_subscriptions) == {FIXATION, GATE_STATUS}
+
+
+def test_an_image_is_shown_with_its_detections(bench):
+    watch(bench)
+    stamps = show_images(bench, lambda scene: len(scene.directions) and scene.command is not None)
     frame = bench.node.frame
-    assert frame.picture.stamp_ns == 5_000_000_000
+    assert frame.picture.stamp_ns in stamps
     jpeg = cv2.imdecode(np.frombuffer(frame.picture.jpeg(), np.uint8), cv2.IMREAD_COLOR)
     assert np.ptp(jpeg) > 100, 'boxes are drawn on the grey'
-    assert frame.glance.posture == pytest.approx((0.2, -0.1))
-    assert frame.glance.command == pytest.approx((0.3, 0.0))
+    assert frame.scene.posture == pytest.approx((0.2, -0.1))
+    assert frame.scene.command == pytest.approx((0.3, 0.0))
     # A ray to the right of the axis is a direction of less pan.
-    assert frame.glance.directions[0, 0] == pytest.approx(0.2 - math.atan(0.1), abs=0.01)
-    assert frame.glance.half_view[0] == pytest.approx(math.radians(18))
+    assert frame.scene.directions[0, 0] == pytest.approx(0.2 - math.atan(0.1), abs=0.01)
+    assert frame.scene.half_view[0] == pytest.approx(math.radians(18))
     assert frame.state.run is RunState.RUNNING
     assert 0 <= frame.latencies_ms[DETECTIONS.name] < 10_000
 
@@ -114,51 +132,66 @@ def test_a_picture_without_its_detections_waits_for_them(bench):
     assert bench.node.frame.picture is None
     bench.publish(DETECTIONS, encode_detections(head, []))
     bench.wait(lambda: bench.node.frame.picture)
+    assert bench.node.frame.picture.stamp_ns == 7_000_000_000
 
 
 def test_the_belief_is_drawn_when_it_comes(bench):
     watch(bench)
     columns = {'pan': [0.1, 0.2], 'tilt': [0.0, 0.1], 'weight': [0.25, 0.75]}
-    bench.publish(BELIEF, encode_columns(header(1), columns))
-    say_image(bench, 1_000_000_000)
-    bench.wait(lambda: bench.node.frame.glance)
-    assert bench.node.frame.glance.belief == pytest.approx(
+    show_images(
+        bench,
+        lambda scene: len(scene.belief),
+        lambda: bench.publish(BELIEF, encode_columns(header(1), columns)),
+    )
+    assert bench.node.frame.scene.belief == pytest.approx(
         np.array([[0.1, 0.0, 0.25], [0.2, 0.1, 0.75]])
     )
 
 
-def test_the_truth_is_heard_on_request_only(bench):
+def test_the_truth_is_received_on_request_only(bench):
     watch(bench)
-    assert hearers(bench, SIM_TRUTH) == 0
+    assert SIM_TRUTH not in bench.node.polled_subscriptions
     bench.node.show_truth(True)
-    bench.wait(lambda: hearers(bench, SIM_TRUTH) == 1)
-    wait_for_ears(bench, [SIM_TRUTH])
+    bench.wait(lambda: subscribers(bench, SIM_TRUTH) == 1)
+    wait_for_publishers(bench, [SIM_TRUTH])
     rows = {'x': [0.8], 'y': [0.1], 'z': [0.0], 'pan': [0.12], 'tilt': [0.0], 'attended': [1.0]}
-    bench.publish(SIM_TRUTH, encode_columns(header(1), rows))
-    say_image(bench, 1_000_000_000)
-    bench.wait(lambda: bench.node.frame.glance)
-    assert bench.node.frame.glance.truth.attended == 0
-    bench.node.watched()
+    show_images(
+        bench,
+        lambda scene: scene.truth is not None,
+        lambda: bench.publish(SIM_TRUTH, encode_columns(header(1), rows)),
+    )
+    assert bench.node.frame.scene.truth.attended == 0
     bench.node.show_truth(False)
-    bench.wait(lambda: hearers(bench, SIM_TRUTH) == 0)
+
+    def unsubscribed():
+        # With a viewer: without one the node unsubscribes from all images.
+        bench.node.note_viewer()
+        return subscribers(bench, SIM_TRUTH) == 0
+
+    bench.wait(unsubscribed)
+    assert subscribers(bench, IMAGE) == 1
 
 
-def test_trials_lights_and_complaints_are_gathered_unwatched(bench):
-    ill = status('/gate', DiagnosticStatus.ERROR, 'stalled', rate='3')
-    bench.publish(DIAGNOSTICS, DiagnosticArray(status=[ill]))
+def test_trials_health_and_errors_are_shown_without_a_viewer(bench):
+    error = status('/gate', DiagnosticStatus.ERROR, 'stalled', rate='3')
+    bench.publish(DIAGNOSTICS, DiagnosticArray(status=[error]))
     bench.publish(GATE_STATUS, status(phase='shift', source='LM', p_lm='0.5', trials='3'))
     bench.wait(lambda: bench.node.frame.facts['source'] == 'LM')
     fixation = JointCodec(JointConfig()).encode(header(1), [0.1, 0.0])
     bench.publish(FIXATION, fixation)
+    bench.publish(GATE_STATUS, status(phase='shift', source='LM', p_lm='0.6', trials='3'))
+    # Each poll takes the fixations first: the next one has the fixation before the end of trial.
+    bench.wait(lambda: bench.node.frame.facts['p(LM)'] == '0.6')
     bench.publish(GATE_STATUS, status(phase='look', source='none', p_lm='0.5', trials='4'))
     bench.publish(SCORE, status(last='success'))
     bench.wait(lambda: 'success, last 1' in bench.node.frame.facts)
     bench.wait(lambda: bench.node.frame.facts.get('fixated by LM') == '100% of 1')
-    [gate] = [light for light in bench.node.frame.lights if light.node == '/gate']
+    bench.wait(lambda: any(node.node == '/gate' for node in bench.node.frame.node_health))
+    [gate] = [node for node in bench.node.frame.node_health if node.node == '/gate']
     assert (gate.level, gate.message) == (Level.ERROR, 'stalled')
 
 
-def logged(bench, text):
+def wait_for_log(bench, text):
     bench.wait(lambda: any(text in line for _, line in bench.node.frame.log))
 
 
@@ -167,19 +200,19 @@ def test_buttons_call_services_and_log_the_answer(bench):
 
     def answer(request, response):
         asked.append(getattr(request, 'data', None))
-        response.success, response.message = len(asked) == 1, 'as you wish'
+        response.success, response.message = len(asked) == 1, 'done'
         return response
 
     bench.peer.create_service(SetBool, 'enable', answer)
     bench.peer.create_service(Trigger, 'home', answer)
     bench.wait(lambda: {'enable', 'home'} <= bench.node.frame.services)
-    bench.node.switch('enable', False)
-    logged(bench, 'enable: as you wish')
-    bench.node.trigger('home')
-    logged(bench, 'home: refused: as you wish')
+    bench.node.call_switch('enable', False)
+    wait_for_log(bench, 'enable: done')
+    bench.node.call_trigger('home')
+    wait_for_log(bench, 'home: refused: done')
     assert asked == [False, None]
-    bench.node.trigger('sim/step')
-    logged(bench, 'sim/step: nobody offers this service')
+    bench.node.call_trigger('sim/step')
+    wait_for_log(bench, 'sim/step: no node offers this service')
 
 
 @dataclass(frozen=True)
@@ -190,7 +223,7 @@ class LiveConfig(Configuration):
 
 @pytest.fixture
 def sim(bench, ros_context):
-    """A node with the parameters of the simulation that the page sets."""
+    """Return a node with the parameters of the simulation that the page sets."""
     sim = GraphNode('sim', context=ros_context)
     sim.configure(LiveConfig, lambda _: None)
     bench.executor.add_node(sim)
@@ -200,19 +233,19 @@ def sim(bench, ros_context):
 
 def test_settings_are_read_set_and_refused(bench, sim):
     def settings():
-        bench.node.watched()
+        bench.node.note_viewer()
         return bench.node.frame.settings
 
     bench.wait(lambda: settings().get('objects') == 3)
-    bench.node.set('objects', 5)
+    bench.node.set_remote_parameter('objects', 5)
     bench.wait(lambda: settings()['objects'] == 5)
     assert sim.get_parameter('objects').value == 5
-    bench.node.set('real_time_factor', -2.0)
-    logged(bench, 'real_time_factor: refused')
+    bench.node.set_remote_parameter('real_time_factor', -2.0)
+    wait_for_log(bench, 'real_time_factor: refused')
     assert sim.get_parameter('real_time_factor').value == 0.0
 
 
-def test_it_says_nothing_to_the_robot(bench):
-    """Only its own health: the page listens."""
+def test_it_publishes_nothing_to_the_robot(bench):
+    """It publishes only its own health."""
     assert set(bench.node.published_topics.values()) == {DIAGNOSTICS}
-    assert bench.node.get_parameter('host').value == '127.0.0.1', 'and to nobody outside'
+    assert bench.node.get_parameter('host').value == '127.0.0.1', 'and serves no other machine'

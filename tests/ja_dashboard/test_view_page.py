@@ -1,7 +1,8 @@
-"""The page and its picture as a browser gets them, from a robot of our own making."""
+"""The page and its picture as a browser gets them, from a model with one frame."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 
 import cv2
 import httpx
@@ -13,25 +14,30 @@ from nicegui.testing import User, user_simulation
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.detection import Detection, Kind
 from ja_common.core.health import Level
-from ja_dashboard.core.view_model import CurvePoints, Light, RunState, State
+from ja_dashboard.core.view_model import CurvePoints, NodeHealth, RunState, State
 from ja_dashboard.image_feed import Picture
 from ja_dashboard.page import PICTURE_URL, Page, facts_html, nodes_html
 from ja_dashboard.server import picture_app
 from ja_dashboard.view_node import Frame
 
+FACE = Detection(Kind.FACE, 0.0, 0.0, 160.0, 120.0, 60.0, 80.0, 0.9)
+CAMERA = CameraModel.from_field_of_view(320, 240, 0.6)
+# All of a picture but its stamp.
+PICTURE = (np.full((240, 320, 3), 60, np.uint8), [FACE], None, CAMERA, 0.004)
 SERVICES = frozenset({'enable', 'home', 'reset_learning', 'sim/pause', 'sim/step'})
 
 
-class Robot:
-    """Shows one frame, and keeps the orders that it is given."""
+class FakeModel:
+    """Shows one frame, and records the requests and the viewers."""
 
     def __init__(self, **changes):
-        self.orders = []
+        self.requests = []
+        self.viewers = 0
         self.frame = Frame(
             **{
                 'state': State(RunState.RUNNING, 'looking at the caregiver'),
                 'facts': {'p(LM)': '0.31'},
-                'lights': [Light('/gate', Level.WARN, 'no <image>', 0.0, {})],
+                'node_health': [NodeHealth('/gate', Level.WARN, 'no <image>', 0.0, {})],
                 'latencies_ms': {'detections': 4.2},
                 'curve': CurvePoints([1], [1.0], [0.2], [1.0], [0.0]),
                 'log': [(1, 'gate: hello')],
@@ -43,38 +49,52 @@ class Robot:
             }
         )
 
-    def watched(self):
-        pass
+    def note_viewer(self):
+        self.viewers += 1
 
     def show_truth(self, shown):
-        self.orders.append(('truth', shown))
+        self.requests.append(('truth', shown))
 
-    def switch(self, service, on):
-        self.orders.append((service, on))
+    def call_switch(self, service, on):
+        self.requests.append((service, on))
 
-    def trigger(self, service):
-        self.orders.append((service,))
+    def call_trigger(self, service):
+        self.requests.append((service,))
 
-    def set(self, name, value):
-        self.orders.append((name, value))
+    def set_remote_parameter(self, name, value):
+        self.requests.append((name, value))
 
 
-def browse(robot: Robot, steps: Callable[[User], Awaitable[None]]) -> None:
+def browse(model: FakeModel, steps: Callable[[User], Awaitable[None]]) -> None:
     async def visit() -> None:
-        async with user_simulation(root=Page(robot).build) as user:
+        async with user_simulation(root=Page(model).build) as user:
             await user.open('/')
             await steps(user)
 
     asyncio.run(visit())
 
 
-def test_it_tells_what_the_robot_does():
+async def until(condition: Callable[[], object], timeout_s: float = 10.0) -> None:
+    """Let the page run until the condition holds."""
+    end_s = asyncio.get_running_loop().time() + timeout_s
+    while not condition():
+        assert asyncio.get_running_loop().time() < end_s, f'not within {timeout_s:g} s'
+        await asyncio.sleep(0.01)
+
+
+def dialogs(user: User) -> list[ui.dialog]:
+    return [each for each in user.client.elements.values() if isinstance(each, ui.dialog)]
+
+
+def test_it_shows_what_the_robot_does():
     async def steps(user):
         await user.should_see('looking at the caregiver')
         await user.should_see('running')
         await user.should_see('gate: hello')
+        [picture] = user.find(ui.interactive_image).elements
+        assert 'ja-old' not in picture.classes
 
-    browse(Robot(), steps)
+    browse(FakeModel(), steps)
 
 
 def test_a_stopped_graph_is_shown_as_stopped_and_its_picture_as_old():
@@ -83,56 +103,73 @@ def test_a_stopped_graph_is_shown_as_stopped_and_its_picture_as_old():
         [picture] = user.find(ui.interactive_image).elements
         assert 'ja-old' in picture.classes
 
-    browse(Robot(state=State(RunState.STOPPED, 'no new image for 9 s')), steps)
+    browse(FakeModel(state=State(RunState.STOPPED, 'no new image for 9 s')), steps)
 
 
-def test_buttons_give_orders_and_a_reset_asks_first():
-    robot = Robot()
+def test_an_open_page_is_a_viewer_and_shows_each_new_picture():
+    model = FakeModel()
+
+    async def steps(user):
+        await until(lambda: model.viewers >= 3)
+        [shown] = user.find(ui.interactive_image).elements
+        for stamp_ns in (7, 8):
+            model.frame = replace(model.frame, picture=Picture(stamp_ns, *PICTURE))
+            await until(lambda stamp_ns=stamp_ns: shown.source == f'{PICTURE_URL}?{stamp_ns}')
+
+    browse(model, steps)
+
+
+def test_buttons_make_requests_and_a_reset_asks_first():
+    model = FakeModel()
 
     async def steps(user):
         user.find('home').click()
         user.find(marker='sim/pause').click()
         user.find('reset learning').click()
-        await user.should_see('Everything that was learned will be forgotten.')
-        assert robot.orders == [('home',), ('sim/pause', True)]
-        user.find('keep it').click()
-        await asyncio.sleep(0.1)
+        await user.should_see('The learner will start from initial weights.')
+        assert model.requests == [('home',), ('sim/pause', True)]
+        user.find('keep everything').click()
+        # The page deletes the dialog after it has dealt with the answer.
+        await until(lambda: not dialogs(user))
+        assert model.requests[2:] == []
         user.find('reset learning').click()
-        await user.should_see('forget it')
-        user.find('forget it').click()
-        await asyncio.sleep(0.1)
-        assert robot.orders[2:] == [('reset_learning',)]
+        await user.should_see('forget everything')
+        user.find('forget everything').click()
+        await until(lambda: not dialogs(user))
+        assert model.requests[2:] == [('reset_learning',)]
 
-    browse(robot, steps)
+    browse(model, steps)
 
 
-def test_what_the_graph_does_not_offer_is_not_shown():
+def test_controls_without_a_service_are_hidden():
     async def steps(user):
         await user.should_see('home')
         await user.should_not_see('rearrange')
         await user.should_not_see('save checkpoint')
 
-    browse(Robot(), steps)
+    browse(FakeModel(), steps)
 
 
-def test_settings_show_what_the_graph_says_without_setting_it():
-    robot = Robot()
+def test_settings_show_the_values_of_the_graph_without_setting_them():
+    model = FakeModel()
 
     async def steps(user):
         [learner] = user.find(marker='learner').elements
         assert (learner.value, list(learner.options)) == ('paper', ['paper', 'gaze_line'])
         [objects] = user.find(marker='objects').elements
         assert objects.value == 3
-        assert robot.orders == []
+        model.frame = replace(model.frame, settings={'objects': 5, 'learner': 'paper'})
+        await until(lambda: objects.value == 5)
+        assert model.requests == []
         learner.set_value('gaze_line')
-        assert robot.orders == [('learner', 'gaze_line')]
+        assert model.requests == [('learner', 'gaze_line')]
 
-    browse(robot, steps)
+    browse(model, steps)
 
 
-def get_picture(robot: Robot) -> httpx.Response:
+def get_picture(model: FakeModel) -> httpx.Response:
     async def get() -> httpx.Response:
-        transport = httpx.ASGITransport(picture_app(robot))
+        transport = httpx.ASGITransport(picture_app(model))
         async with httpx.AsyncClient(transport=transport, base_url='http://test') as client:
             return await client.get(f'{PICTURE_URL}?1')
 
@@ -140,10 +177,9 @@ def get_picture(robot: Robot) -> httpx.Response:
 
 
 def test_the_picture_is_the_newest_one_as_jpeg():
-    face = Detection(Kind.FACE, 0.0, 0.0, 160.0, 120.0, 60.0, 80.0, 0.9)
-    camera = CameraModel.from_field_of_view(320, 240, 0.6)
-    picture = Picture(1, np.full((240, 320, 3), 60, np.uint8), [face], None, camera, 0.004)
-    answer = get_picture(Robot(picture=picture))
+    model = FakeModel(picture=Picture(1, *PICTURE))
+    answer = get_picture(model)
+    assert model.viewers == 1
     assert answer.headers['content-type'] == 'image/jpeg'
     drawn = cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_COLOR)
     assert drawn.shape == (480, 640, 3)
@@ -151,16 +187,18 @@ def test_the_picture_is_the_newest_one_as_jpeg():
 
 
 def test_before_the_first_picture_there_is_none():
-    assert get_picture(Robot()).status_code == 404
+    assert get_picture(FakeModel()).status_code == 404
 
 
 @pytest.mark.parametrize('level', list(Level))
-def test_every_light_has_its_colour_and_its_text_is_no_markup(level):
-    shown = nodes_html([Light('/gate', level, 'no <image>', 0.0, {})], {})
+def test_every_node_shows_its_level_and_its_text_is_escaped(level):
+    shown = nodes_html([NodeHealth('/gate', level, 'no <image>', 0.0, {})], {})
     assert f'title="{level.name}"' in shown
     assert '<image>' not in shown
     assert ('no &lt;image&gt;' in shown) is (level is not Level.OK)
 
 
-def test_facts_are_no_markup():
-    assert '<b>' not in facts_html({'phase': '<b>'})
+def test_facts_are_escaped():
+    shown = facts_html({'phase': '<b>'})
+    assert '<b>' not in shown
+    assert '&lt;b&gt;' in shown

@@ -1,12 +1,13 @@
 """The doctor finds what is wrong, and how to fix it."""
 
+import mmap
 import os
 import socket
 import sys
 
 import pytest
 
-from ja_diagnostics import doctor
+from ja_diagnostics import doctor, image_stream
 from ja_diagnostics.doctor import (
     check_ports,
     check_python,
@@ -34,7 +35,7 @@ def test_the_version_of_python(version, ok, monkeypatch):
 
 def test_shared_memory_that_is_not_there(tmp_path):
     assert not check_shared_memory(tmp_path / 'none').ok
-    assert check_shared_memory(tmp_path).name == 'shared memory'
+    assert ' MB free in ' in check_shared_memory(tmp_path).text
 
 
 def test_segments_in_use_are_not_stale(tmp_path, monkeypatch):
@@ -42,6 +43,31 @@ def test_segments_in_use_are_not_stale(tmp_path, monkeypatch):
         (tmp_path / name).write_bytes(bytes(5000))
     monkeypatch.setattr(doctor, '_files_in_use', lambda: {str(tmp_path / 'fastrtps_alive')})
     assert check_stale_segments(tmp_path).text.startswith('1 left behind')
+
+
+def test_a_mapped_segment_is_in_use(tmp_path):
+    path = tmp_path / 'fastrtps_mapped'
+    path.write_bytes(bytes(5000))
+    assert str(path) not in doctor._files_in_use()
+    with path.open('r+b') as file, mmap.mmap(file.fileno(), 0):
+        assert str(path) in doctor._files_in_use()
+
+
+@pytest.mark.usefixtures('domain')
+def test_two_processes_discover_each_other_and_images_arrive():
+    finding = doctor.check_discovery()
+    assert finding.ok, finding
+    assert finding.text.startswith('found in ')
+
+
+@pytest.mark.usefixtures('domain')
+def test_processes_that_do_not_discover_each_other_are_reported(monkeypatch):
+    monkeypatch.setattr(image_stream, 'PUBLISH', 'no such word')
+    monkeypatch.setattr(image_stream, 'RECEIVE', 'no such word')
+    finding = doctor.check_discovery()
+    assert not finding.ok
+    assert 'did not find each other' in finding.text
+    assert finding.fix
 
 
 def test_the_ports_of_the_domain(domain, monkeypatch):

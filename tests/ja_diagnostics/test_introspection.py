@@ -1,4 +1,4 @@
-"""What `ros2 param` and `ros2 topic info` meet: every node answers as its documentation says."""
+"""`ros2 param` and `ros2 topic info`: every node answers as its documentation says."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,12 +6,12 @@ from typing import Any
 
 import rclpy
 import yaml
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 
 from ja_bringup.reference import COMPANIONS, NODES, every_node
+from ja_common.executor import CachedWaitSetExecutor
 from ros_testing import spin_until
 
 ALL = (*NODES, *COMPANIONS)
@@ -19,8 +19,8 @@ Ask = Callable[..., Any]
 
 
 def asker(tool: Node, node: Node) -> Ask:
-    """Waits for the node's answer to an asynchronous question of the tool."""
-    executor = SingleThreadedExecutor(context=node.context)
+    """Return a function that waits for the node's answer to a request of the tool."""
+    executor = CachedWaitSetExecutor(context=node.context)
     executor.add_node(tool)
     executor.add_node(node)
 
@@ -33,7 +33,7 @@ def asker(tool: Node, node: Node) -> Ask:
 
 
 def dumped(client: AsyncParameterClient, ask: Ask) -> dict[str, Any]:
-    """What `ros2 param dump` writes of a node."""
+    """Return what `ros2 param dump` writes of a node."""
     names = sorted(ask(client.list_parameters).result.names)
     values = ask(client.get_parameters, names).values
     return {name: parameter_value_to_python(v) for name, v in zip(names, values, strict=True)}
@@ -75,7 +75,7 @@ def test_parameters_survive_dump_and_load(domain: int, tmp_path: Path) -> None:
                 assert node.get_parameter(name).value == value, (node.get_name(), name)
 
 
-def test_what_is_said_and_heard_has_the_quality_of_service_of_the_table(domain: int) -> None:
+def test_publishers_and_subscribers_have_the_quality_of_service_of_the_table(domain: int) -> None:
     with every_node(ALL) as nodes:
         seen = 0
         for node in nodes:

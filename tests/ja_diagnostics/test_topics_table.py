@@ -2,9 +2,9 @@
 
 import threading
 
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from ja_common.executor import CachedWaitSetExecutor
 from ja_common.topics import DETECTIONS, FIXATION, SUCCESS_RATE
 from ja_diagnostics.topics_table import measure_topics, table_of_topics
 
@@ -18,7 +18,7 @@ def test_a_graph_is_listed_with_rates_and_purposes(ros_context):
     )
     node.create_subscription(FIXATION.type, FIXATION.name, lambda _: None, FIXATION.subscriber_qos)
     node.create_timer(0.02, lambda: often.publish(DETECTIONS.type()))
-    executor = SingleThreadedExecutor(context=ros_context)
+    executor = CachedWaitSetExecutor(context=ros_context)
     executor.add_node(node)
     ended = threading.Event()
 

@@ -6,15 +6,13 @@ import pytest
 
 from ja_experiments.agents.gym_agent import GymAgent
 from ja_learning.core.gaze_line_config import GazeLineConfig
-from ja_learning.core.learner_registry import LearnerChoice, make_learner
-from ja_learning.core.network_config import NetworkConfig
+from ja_learning.core.learner_registry import make_learner
 
 
 @pytest.mark.parametrize('kind', ['paper', 'gaze_line'])
 def test_a_learner_learns_from_the_episodes_it_ends(kind):
-    learner = make_learner(
-        LearnerChoice(kind), NetworkConfig(), GazeLineConfig(members=2, channels=2), seed=0
-    )
+    small = GazeLineConfig(members=2, channels=2)
+    learner = make_learner(kind, 0, small if kind == 'gaze_line' else None)
     agent = GymAgent(learner, p_lm=0.0, seed=0)
     env = gymnasium.make(
         'ja_sim.gym_env:JointAttention-v0', scene='easy', image_size=(160, 120), max_shifts=3

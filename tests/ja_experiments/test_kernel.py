@@ -1,4 +1,4 @@
-"""The fast kernel is the readable experiment, trial by trial, on the same draws."""
+"""The fast kernel computes the readable experiment, trial by trial, from the same draws."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from ja_experiments.paper.outcomes import Outcomes
 from ja_experiments.paper.reference import ReferenceExperiment
 from ja_sim.core.specs import ObjectsSpec
 
-# The gate opens half-way, so that both sources and both kinds of trial end are compared.
+# The gate opens half-way through the run: both modules and both ends of a trial occur.
 GATE = {'sigmoid_centre_trials': 500, 'sigmoid_slope_trials': 150.0}
 EVERY_OPTION_ELSE = {
     'candidate': 'most_salient',
@@ -50,7 +50,7 @@ def test_same_trials_and_same_weights_after_1000_trials(
     wanted, got = readable.network.state(), fast.network.state()
     untrained = ReferenceExperiment(config, places, looks, seed=3).network.state()
     assert got.keys() == wanted.keys()
-    # Nothing in the paper asks for evidence: the kernel weighs none.
+    # The paper has no evidence: the kernel computes none.
     for name in wanted.keys() - {'evidence.nats', 'evidence.faces'}:
         array = wanted[name]
         np.testing.assert_allclose(got[name], array, rtol=0, atol=1e-5, err_msg=name)
@@ -76,7 +76,7 @@ def test_a_run_in_parts_is_the_same_run(looks: Looks, places: ObjectsSpec) -> No
 def test_without_learning_visual_feedback_stays_at_chance(
     looks: Looks, places: ObjectsSpec
 ) -> None:
-    # A caregiver who never looks at what she means: all five objects are placed alike.
+    # The caregiver never looks at the attended object: all five objects are placed alike.
     config = reading('all').with_settings(
         {'gating': 'constant', 'p_lm_max': 0.0, 'reliability': 0.0}
     )
@@ -95,11 +95,11 @@ def test_learning_raises_success_well_above_chance(looks: Looks, places: Objects
     assert outcomes.success[-3000:][~outcomes.in_view[-3000:]].mean() > 0.5
 
 
-def test_answers_are_those_of_the_network(looks: Looks, places: ObjectsSpec) -> None:
+def test_predictions_are_those_of_the_network(looks: Looks, places: ObjectsSpec) -> None:
     config = reading('last').with_settings({'face_scaling': 'standardised'})
     experiment = FastExperiment(config, places, looks, seed=0)
     experiment.run(3000)
-    answers = experiment.answers(prepare(looks, config))
+    commands = experiment.predict(prepare(looks, config))
     wanted = experiment.network.predict(looks.faces, looks.postures)
-    np.testing.assert_allclose(answers, wanted, atol=1e-5)
+    np.testing.assert_allclose(commands, wanted, atol=1e-5)
     assert np.std(wanted) > 0.01

@@ -1,4 +1,4 @@
-"""Looks are rendered once and kept, and made again when anything about them is not right."""
+"""Looks are rendered once and cached, and rendered again when the cache is not valid."""
 
 import json
 from pathlib import Path
@@ -6,12 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ja_experiments.datasets import looks as looks_module
 from ja_experiments.datasets.looks import Looks, load_looks
 
 
 class Renderer:
-    """Counts how often looks are made."""
+    """Counts how often looks are rendered."""
 
     def __init__(self, looks: Looks) -> None:
         self.looks = looks
@@ -23,30 +22,28 @@ class Renderer:
 
 
 @pytest.fixture
-def renderer(looks: Looks, monkeypatch: pytest.MonkeyPatch) -> Renderer:
-    renderer = Renderer(looks)
-    monkeypatch.setattr(looks_module, '_render', renderer)
-    return renderer
+def renderer(looks: Looks) -> Renderer:
+    return Renderer(looks)
 
 
-def load(folder: Path, said: list[str], seed: int = 0) -> Looks:
-    return load_looks(seed=seed, count=125, folder=folder, say=said.append)
+def load(folder: Path, renderer: Renderer, lines: list[str], seed: int = 0) -> Looks:
+    return load_looks(seed=seed, count=125, folder=folder, report=lines.append, render=renderer)
 
 
-def test_looks_are_kept(tmp_path: Path, renderer: Renderer) -> None:
-    said: list[str] = []
-    first, second = load(tmp_path, said), load(tmp_path, said)
+def test_looks_are_cached(tmp_path: Path, renderer: Renderer) -> None:
+    lines: list[str] = []
+    first, second = load(tmp_path, renderer, lines), load(tmp_path, renderer, lines)
     np.testing.assert_array_equal(first.faces, second.faces)
     np.testing.assert_array_equal(first.directions, second.directions)
     assert renderer.times == 1
-    assert len(said) == 1
-    assert 'none are kept' in said[0]
+    assert len(lines) == 1
+    assert 'none are cached' in lines[0]
 
 
-def test_another_seed_has_looks_of_its_own(tmp_path: Path, renderer: Renderer) -> None:
-    load(tmp_path, [])
-    load(tmp_path, [], seed=1)
-    load(tmp_path, [])
+def test_another_seed_has_its_own_looks(tmp_path: Path, renderer: Renderer) -> None:
+    load(tmp_path, renderer, [])
+    load(tmp_path, renderer, [], seed=1)
+    load(tmp_path, renderer, [])
     assert renderer.times == 2
 
 
@@ -84,32 +81,32 @@ def older_sources(kept: Path) -> None:
         (cut_data, 'damaged'),
         (cut_manifest, 'cannot be read'),
         (other_manifest, 'damaged'),
-        (older_sources, 'made by other sources'),
+        (older_sources, 'made with other sources'),
     ],
 )
-def test_what_cannot_be_used_is_made_again_with_one_line(
+def test_looks_that_cannot_be_used_are_rendered_again_with_one_line(
     tmp_path: Path, renderer: Renderer, spoil: object, reason: str
 ) -> None:
-    load(tmp_path, [])
+    load(tmp_path, renderer, [])
     (kept,) = tmp_path.iterdir()
     spoil(kept)  # type: ignore[operator]
-    said: list[str] = []
-    load(tmp_path, said)
+    lines: list[str] = []
+    load(tmp_path, renderer, lines)
     assert renderer.times == 2
-    assert len(said) == 1
-    assert reason in said[0]
-    load(tmp_path, said)
-    assert renderer.times == 2, 'what was made again is kept'
+    assert len(lines) == 1
+    assert reason in lines[0]
+    load(tmp_path, renderer, lines)
+    assert renderer.times == 2, 'the new looks are cached'
 
 
 def test_rendered_looks_show_where_she_looks(tmp_path: Path) -> None:
-    """Through the real world, detector and crop: her face turns with what she attends to."""
-    found = load_looks(count=12, folder=tmp_path, say=lambda line: None)
-    again = load_looks(count=12, folder=tmp_path / 'elsewhere', say=lambda line: None)
+    """Her face turns with the attended object, through the real world, detector and crop."""
+    found = load_looks(count=12, folder=tmp_path, report=lambda line: None)
+    again = load_looks(count=12, folder=tmp_path / 'elsewhere', report=lambda line: None)
     np.testing.assert_array_equal(found.faces, again.faces)
     assert found.faces.shape == (12, 30, 25)
     assert len(np.unique(found.directions, axis=0)) == 12
-    # The head stands on her face, 1.2 m straight ahead.
+    # The head points at her face, 1.2 m straight ahead.
     assert np.abs(found.postures).max() < np.radians(4)
     assert np.ptp(found.directions[:, 0]) > np.radians(30)
     assert all(face.std() > 10 for face in found.faces)

@@ -1,4 +1,4 @@
-"""From configuration to report: a short study, whole."""
+"""A short study, from configuration to report."""
 
 import json
 import math
@@ -11,11 +11,10 @@ import yaml
 from ja_common.core.statistics import over_seeds
 from ja_experiments.config import reading
 from ja_experiments.datasets.looks import Looks
-from ja_experiments.paper import study as study_module
 from ja_experiments.paper.experiment import BLOCKS, Materials, Plan, run_conditions
 from ja_experiments.paper.report import write_report
 from ja_experiments.paper.study import StudyConfig, read_ablations, run_study
-from ja_experiments.progress import Progress
+from ja_experiments.progress_bars import ProgressBars
 from ja_sim.core.specs import ObjectsSpec
 
 
@@ -47,11 +46,11 @@ def test_shares_are_those_of_the_outcomes(materials: Materials) -> None:
     np.testing.assert_array_equal(alone.runs[0].online.fixated, condition.runs[1].online.fixated)
 
 
-def test_progress_is_told_and_an_error_in_it_ends_the_run(materials: Materials) -> None:
-    told: list[int] = []
+def test_progress_is_reported_and_an_error_in_it_ends_the_run(materials: Materials) -> None:
+    reported: list[int] = []
     plan = Plan(trials=3000, seeds=(0, 1), test_trials=10)
-    run_conditions({'x': reading('all')}, plan, materials, progress=told.append)
-    assert sum(told) == 6000
+    run_conditions({'x': reading('all')}, plan, materials, progress=reported.append)
+    assert sum(reported) == 6000
 
     def fail(_: int) -> None:
         raise KeyboardInterrupt
@@ -68,14 +67,11 @@ def test_every_ablation_changes_something() -> None:
         assert any(changed) == (name != 'as it stands'), name
 
 
-def test_a_study_becomes_a_report(
-    tmp_path: Path, materials: Materials, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(study_module, 'prepare_materials', lambda *_: materials)
+def test_a_study_becomes_a_report(tmp_path: Path, materials: Materials) -> None:
     config = StudyConfig(
         plan=Plan(trials=3000, seeds=(0, 1), test_trials=200), episodes=3, ablation_seeds=1
     )
-    path = write_report(run_study(config, Progress()), tmp_path / 'report')
+    path = write_report(run_study(config, ProgressBars(), materials), tmp_path / 'report')
 
     text = path.read_text()
     pictures = {line.split('](')[1].rstrip(')') for line in text.splitlines() if '![' in line}

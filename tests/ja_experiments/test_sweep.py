@@ -1,4 +1,4 @@
-"""Sweeps: finished cells are kept, and no death of a process costs more than what it was at."""
+"""Sweeps: finished cells are kept; the death of a process costs only its current cell."""
 
 import multiprocessing
 import os
@@ -13,7 +13,7 @@ from distributed import LocalCluster
 from ja_common.core.config import ConfigError
 from ja_experiments.datasets.looks import Looks
 from ja_experiments.paper.experiment import Materials
-from ja_experiments.progress import Progress
+from ja_experiments.progress_bars import ProgressBars
 from ja_experiments.sweep import Grid, read_grid, run_cell, run_sweep
 from ja_sim.core.specs import ObjectsSpec
 
@@ -35,7 +35,7 @@ def grid_file(folder: Path, seeds: int) -> Path:
 
 
 def cell_files(folder: Path) -> dict[Path, int]:
-    """Finished cells, and when each was written."""
+    """Return the finished cells, and when each was written."""
     return {path: path.stat().st_mtime_ns for path in folder.glob('cells/*.json')}
 
 
@@ -47,7 +47,7 @@ def wait_for_cells(folder: Path, count: int) -> None:
 
 
 def sweep_in_child(grid: Grid, materials: Materials, folder: Path, address: str) -> None:
-    run_sweep(grid, materials, folder, Progress(), scheduler=address)
+    run_sweep(grid, materials, folder, ProgressBars(), scheduler=address)
 
 
 def test_a_grid_is_every_combination_with_every_seed(tmp_path: Path) -> None:
@@ -78,7 +78,7 @@ def test_a_wrong_grid_is_refused_in_one_sentence(tmp_path: Path, text: str, mess
 
 
 @pytest.mark.slow
-def test_a_killed_worker_and_a_killed_sweep_lose_only_what_they_were_at(
+def test_a_killed_worker_and_a_killed_sweep_lose_only_their_current_cells(
     tmp_path: Path, materials: Materials
 ) -> None:
     grid = read_grid(grid_file(tmp_path, seeds=4))
@@ -122,17 +122,17 @@ def test_only_missing_cells_are_run_and_other_looks_are_other_cells(
     ) as cluster:
         address = cluster.scheduler_address
         small = read_grid(grid_file(tmp_path, seeds=1))
-        run_sweep(small, materials, tmp_path, Progress(), address)
+        run_sweep(small, materials, tmp_path, ProgressBars(), address)
         written = cell_files(tmp_path)
         assert len(written) == 2
 
         larger = read_grid(grid_file(tmp_path, seeds=2))
-        table = run_sweep(larger, materials, tmp_path, Progress(), address)
+        table = run_sweep(larger, materials, tmp_path, ProgressBars(), address)
         assert written.items() <= cell_files(tmp_path).items()
         assert pyarrow.parquet.read_table(table).num_rows == 4
 
         other = Materials(materials.fresh, materials.pool, materials.places)
-        run_sweep(small, other, tmp_path, Progress(), address)
+        run_sweep(small, other, tmp_path, ProgressBars(), address)
         assert len(cell_files(tmp_path)) == 4 + 2
-    # All cells are there: nobody is asked for work.
-    run_sweep(larger, materials, tmp_path, Progress(), scheduler='tcp://nowhere.invalid:1')
+    # All cells are there: no scheduler is contacted.
+    run_sweep(larger, materials, tmp_path, ProgressBars(), scheduler='tcp://nowhere.invalid:1')

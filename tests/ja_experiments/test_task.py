@@ -1,4 +1,4 @@
-"""The simulated environment, and the readings of the paper that are options."""
+"""The simulated environment, and the options for readings of the paper."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def test_objects_keep_clear_of_the_face_and_of_each_other(
     config = ExperimentConfig().with_settings({'objects': 10})
     task, rng = task_of(config, places, looks), np.random.default_rng(0)
     for _ in range(50):
-        setting = task.draw(rng)
+        setting = task.draw_setting(rng)
         np.testing.assert_array_equal(setting.directions[ATTENDED], looks.directions[setting.look])
         to_face = angle_between(setting.directions[1:], looks.postures[setting.look])
         assert to_face.min() > np.radians(places.gap_to_face_deg)
@@ -38,7 +38,7 @@ def test_the_camera_sees_what_is_in_its_view_and_of_interest(
     places: ObjectsSpec, looks: Looks
 ) -> None:
     task = task_of(ExperimentConfig(), places, looks)
-    setting = task.draw(np.random.default_rng(1))
+    setting = task.draw_setting(np.random.default_rng(1))
     at_object = setting.directions[ATTENDED]
     seen = task.detections(setting, at_object)
     nearest = min(objects(seen), key=lambda d: np.hypot(*d.ray))
@@ -50,13 +50,13 @@ def test_the_camera_sees_what_is_in_its_view_and_of_interest(
 
 
 def sources_of_trials(drawn: str, trials: int) -> list[set[Source]]:
-    """Who moved the head in each trial, where nothing is ever in view."""
+    """Return the modules that moved the head in each trial, with nothing in view."""
     config = reading('all').with_settings(
         {'gating': 'constant', 'p_lm_max': 0.5, 'source_drawn': drawn}
     )
     robot, found = Robot(config, FixedTurn([0.01, 0.0]), np.random.default_rng(0)), []
     task = SimulatedTask(config.task, config.interest, ObjectsSpec(), one_look())
-    setting, stamp_ns = task.draw(np.random.default_rng(0)), 0
+    setting, stamp_ns = task.draw_setting(np.random.default_rng(0)), 0
     face = [d for d in task.detections(setting, np.zeros(2)) if d.kind is Kind.FACE]
     for _ in range(trials):
         stamp_ns += 10**8

@@ -23,7 +23,7 @@ class SlowLearner:
         self.begun = threading.Semaphore(0)
         self.may_end = threading.Semaphore(0)
 
-    def learn(self, lesson):
+    def update(self, lesson):
         self.begun.release()
         assert self.may_end.acquire(timeout=PATIENCE_S)
         if lesson is None:
@@ -36,7 +36,7 @@ class SlowLearner:
 
 def settle(background):
     """Wait until all is learned."""
-    background.ask(lambda learner: None)
+    background.call_with_learner(lambda learner: None)
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def make():
 
 def test_the_snapshot_before_answers_until_the_lesson_is_over(make, slow):
     background = make(slow)
-    background.learn(trial(0))
+    background.update(trial(0))
     assert slow.begun.acquire(timeout=PATIENCE_S)
     assert background.predictor == 'after 0'
     assert (background.trials, background.waiting) == (1, 1)
@@ -74,7 +74,7 @@ def test_lessons_are_learned_one_by_one_in_the_order_in_which_they_came(make, sl
     learned = []
     background = make(slow, lambda learner: learned.append(learner.trials))
     for number in range(5):
-        background.learn(trial(number))
+        background.update(trial(number))
     settle(background)
     assert learned == [1, 2, 3, 4, 5]
     assert background.pop_errors() == []
@@ -83,18 +83,18 @@ def test_lessons_are_learned_one_by_one_in_the_order_in_which_they_came(make, sl
 def test_the_learner_is_asked_when_it_has_learned_all(make, slow):
     slow.may_end.release(2)
     background = make(slow)
-    background.learn(trial(0))
-    background.learn(trial(1))
-    assert background.ask(lambda learner: learner.trials) == 2
+    background.update(trial(0))
+    background.update(trial(1))
+    assert background.call_with_learner(lambda learner: learner.trials) == 2
 
 
 def test_in_step_the_same_lessons_show_however_quick_they_were(make, slow):
     background = make(slow, behind=1)
     slow.may_end.release(2)
-    background.learn(trial(0))
+    background.update(trial(0))
     settle(background)
     assert background.predictor == 'after 0', 'the newest lesson never shows, though it is over'
-    background.learn(trial(1))
+    background.update(trial(1))
     assert background.predictor == 'after 1', 'the one before it is waited for'
     settle(background)
     assert background.predictor == 'after 1'
@@ -103,8 +103,8 @@ def test_in_step_the_same_lessons_show_however_quick_they_were(make, slow):
 def test_a_lesson_that_fails_is_told_and_the_next_is_learned(make, slow):
     slow.may_end.release(2)
     background = make(slow)
-    background.learn(None)
-    background.learn(trial(0))
+    background.update(None)
+    background.update(trial(0))
     settle(background)
     assert [str(error) for error in background.pop_errors()] == ['nothing to learn from']
     assert background.pop_errors() == []
@@ -117,17 +117,17 @@ def test_what_fails_after_a_lesson_is_told_and_the_lesson_is_kept(make, slow):
 
     slow.may_end.release()
     background = make(slow, save)
-    background.learn(trial(0))
+    background.update(trial(0))
     settle(background)
     assert [str(error) for error in background.pop_errors()] == ['the disk is full']
     assert background.predictor == 'after 1'
     with pytest.raises(OSError, match='the disk is full'):
-        background.ask(save)
+        background.call_with_learner(save)
 
 
 def test_to_close_is_to_learn_what_was_handed_over(slow):
     background = BackgroundLearner(slow, lambda learner: None)
-    background.learn(trial(0))
+    background.update(trial(0))
     slow.may_end.release()
     assert background.close(PATIENCE_S) is slow
     assert slow.trials == 1
@@ -136,7 +136,7 @@ def test_to_close_is_to_learn_what_was_handed_over(slow):
 def test_what_would_take_too_long_at_the_end_is_left(slow):
     background = BackgroundLearner(slow, lambda learner: None)
     for number in range(3):
-        background.learn(trial(number))
+        background.update(trial(number))
     assert slow.begun.acquire(timeout=PATIENCE_S)
     threading.Timer(0.5, slow.may_end.release).start()
     assert background.close(0.0).trials == 1
@@ -147,10 +147,10 @@ def test_it_learns_what_it_would_have_learned_in_one_thread(make):
     alone = GazeLineLearner(config, seed=3)
     background = make(GazeLineLearner(config, seed=3))
     for number in range(20):
-        alone.learn(trial(number))
-        background.learn(trial(number))
+        alone.update(trial(number))
+        background.update(trial(number))
         # Asking meanwhile must disturb nothing.
         background.predictor.propose(trial(number).face, (0, 0), (0, 0), [(0.1, 0.2)])
-    state = background.ask(GazeLineLearner.state)
+    state = background.call_with_learner(GazeLineLearner.state)
     for name, array in alone.state().items():
         np.testing.assert_array_equal(state[name], array, err_msg=name)

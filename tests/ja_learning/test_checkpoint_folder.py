@@ -10,25 +10,23 @@ import pytest
 from ja_common.core.config import ConfigError
 from ja_learning.core.checkpoint import load_checkpoint, save_checkpoint
 from ja_learning.core.checkpoint_folder import LAST, CheckpointConfig, CheckpointFolder, Resumed
-from ja_learning.core.gaze_line import GazeLineLearner
 from ja_learning.core.gaze_line_config import GazeLineConfig
-from ja_learning.core.learner_registry import LearnerChoice, make_learner
-from ja_learning.core.network import ThreeLayerNetwork
+from ja_learning.core.learner_registry import LEARNERS, make_learner
 from ja_learning.core.network_config import NetworkConfig
 from made_up_trials import trial
 
-KINDS = (ThreeLayerNetwork.kind, GazeLineLearner.kind)
+KINDS = tuple(LEARNERS)
 
 
 def untrained(kind='paper', seed=0, **network):
     gaze_line = GazeLineConfig(replay_steps=1, replay_memory=20)
-    return make_learner(LearnerChoice(kind), NetworkConfig(**network), gaze_line, seed)
+    return make_learner(kind, seed, NetworkConfig(**network) if kind == 'paper' else gaze_line)
 
 
 def taught(trials=3, **choice):
     learner = untrained(**choice)
     for number in range(trials):
-        learner.learn(trial(number))
+        learner.update(trial(number))
     return learner
 
 
@@ -62,8 +60,8 @@ def test_another_process_would_go_on_as_if_nothing_had_happened(folder, kind):
     assert folder.resume_into(heir) == Resumed(path, [])
     assert same(heir, learner)
     for number in range(30, 40):
-        learner.learn(trial(number))
-        heir.learn(trial(number))
+        learner.update(trial(number))
+        heir.update(trial(number))
     assert same(heir, learner)
 
 
@@ -237,7 +235,7 @@ def test_it_is_saved_every_so_many_trials_and_at_the_end_if_need_be(tmp_path):
     learner = untrained()
     saved = []
     for number in range(10):
-        learner.learn(trial(number))
+        learner.update(trial(number))
         folder.save_when_due(learner)
         saved.append(len(names(folder)[1:]))
     assert saved == [0, 0, 0, 1, 1, 1, 1, 2, 2, 2]
@@ -255,7 +253,7 @@ def test_who_goes_on_is_saved_when_so_many_more_were_learned(tmp_path):
     folder.save_when_changed(learner)
     assert len(names(folder)[1:]) == 1
     for number in range(4):
-        learner.learn(trial(number))
+        learner.update(trial(number))
         folder.save_when_due(learner)
     assert len(names(folder)[1:]) == 2
     folder.close()

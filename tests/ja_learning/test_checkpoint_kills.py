@@ -32,7 +32,7 @@ def live(folder: Path, tell: Connection) -> None:
     checkpoints.resume_into(learner)
     tell.send(learner.trials)
     while True:
-        learner.learn(trial(learner.trials))
+        learner.update(trial(learner.trials))
         tell.send(learner.trials)
         checkpoints.save_when_due(learner)
 
@@ -77,7 +77,7 @@ def last_told(hear: Connection, count: int) -> int:
 def uninterrupted(trials: int) -> GazeLineLearner:
     learner = untrained()
     for number in range(trials):
-        learner.learn(trial(number))
+        learner.update(trial(number))
     return learner
 
 

@@ -23,7 +23,7 @@ from ja_common.topics import (
     JOINT_STATES,
     LM_DELTA,
 )
-from ja_learning.core.learning_module import BELIEF_SAMPLES
+from ja_learning.core.trial_pipeline import BELIEF_SAMPLES
 from ja_learning.core.network import ThreeLayerNetwork
 from ja_learning.core.network_config import NetworkConfig
 from ja_learning.core.trial import Trial
@@ -144,7 +144,7 @@ def test_postures_at_rest_are_taught_and_those_passed_on_the_way_are_not(life):
     life.pass_by(0.25)
     life.fixate(0.3, (0.4, 0.1))
     network = ThreeLayerNetwork(NetworkConfig(), seed=0)
-    network.learn(
+    network.update(
         Trial(FACE, np.zeros(2), np.array([(0.0, 0.0), (0.2, 0.0)]), np.array((0.4, 0.1)))
     )
     assert list(life.look().position) == pytest.approx(network.predict(FACE, (0, 0)), abs=1e-7)
@@ -170,7 +170,7 @@ def test_in_lockstep_it_answers_with_what_it_knew_a_trial_ago(make_life):
         assert list(life.look().position) == pytest.approx(network.predict(FACE, (0, 0)))
         life.fixate(0.3, (0.4, 0.1))
         if life.learned > 1:
-            network.learn(Trial(FACE, np.zeros(2), np.array([(0.0, 0.0)]), np.array((0.4, 0.1))))
+            network.update(Trial(FACE, np.zeros(2), np.array([(0.0, 0.0)]), np.array((0.4, 0.1))))
 
 
 def test_disabled_learning_still_proposes(life):

@@ -58,7 +58,7 @@ def test_step_goes_down_the_squared_error(name):
     """Against central differences in double precision."""
     network = ThreeLayerNetwork(NetworkConfig(learning_rate=0.1, momentum=0.0), seed=0)
     before, trial = as_float64(network.state()), make_trial()
-    network.learn(trial)
+    network.update(trial)
     step = network.state()[name] - before[name]
     for index in list(np.ndindex(step.shape))[:: max(1, step.size // 20)]:
         either_side = []
@@ -76,7 +76,7 @@ def test_momentum_carries_the_last_step_on():
         network = ThreeLayerNetwork(config, seed=0)
         path = [network.state()['output_biases']]
         for _ in range(2):
-            network.learn(make_trial())
+            network.update(make_trial())
             path.append(network.state()['output_biases'])
         return np.diff(path, axis=0)
 
@@ -91,7 +91,7 @@ def test_all_pairs_are_learned_in_order_or_only_the_last():
     def learned(pairs, *trials):
         network = ThreeLayerNetwork(NetworkConfig(pairs=pairs), seed=0)
         for trial in trials:
-            network.learn(trial)
+            network.update(trial)
         return network.state()
 
     one_by_one = [make_trial([posture]) for posture in postures]
@@ -107,7 +107,7 @@ def test_error_that_was_left_is_told_in_radians():
     assert np.isnan(network.last_error_rad)
     trial = make_trial()
     wanted = np.linalg.norm(network.predict(FACE, trial.postures[0]) - trial.displacements()[0])
-    network.learn(trial)
+    network.update(trial)
     assert network.last_error_rad == pytest.approx(wanted, rel=1e-4)
 
 
@@ -133,7 +133,7 @@ def test_it_learns_where_a_bright_spot_points_from_any_posture():
     tests = [draw() for _ in range(100)]
     before = error()
     for _ in range(1500):
-        network.learn(draw())
+        network.update(draw())
     assert before > 0.25
     assert error() < 0.5 * before
 
@@ -141,11 +141,11 @@ def test_it_learns_where_a_bright_spot_points_from_any_posture():
 def test_state_restored_continues_bit_for_bit():
     first = ThreeLayerNetwork(NetworkConfig(), seed=0)
     for _ in range(3):
-        first.learn(make_trial())
+        first.update(make_trial())
     second = ThreeLayerNetwork(NetworkConfig(), seed=99)
     second.restore(first.state())
     for network in (first, second):
-        network.learn(make_trial([(0.2, 0.0), (0.3, 0.1)]))
+        network.update(make_trial([(0.2, 0.0), (0.3, 0.1)]))
     one, other = first.state(), second.state()
     assert one.keys() == other.keys()
     assert all(np.array_equal(one[name], other[name]) for name in one)
@@ -155,11 +155,11 @@ def test_state_restored_continues_bit_for_bit():
 def test_untaught_state_restores_an_untaught_network():
     taught = ThreeLayerNetwork(NetworkConfig(), seed=0)
     untrained = taught.state()
-    taught.learn(make_trial())
+    taught.update(make_trial())
     taught.restore(untrained)
     fresh = ThreeLayerNetwork(NetworkConfig(), seed=0)
     for network in (taught, fresh):
-        network.learn(make_trial())
+        network.update(make_trial())
     assert np.array_equal(taught.state()['hidden_weights'], fresh.state()['hidden_weights'])
 
 
@@ -203,6 +203,6 @@ def test_network_without_posture_does_not_see_it():
 def test_a_trial_that_was_given_up_teaches_nothing():
     network = ThreeLayerNetwork(NetworkConfig(), seed=0)
     before = network.state()
-    network.learn(Trial(FACE, np.zeros(2), np.zeros((1, 2)), None, np.ones((2, 2)), 2))
+    network.update(Trial(FACE, np.zeros(2), np.zeros((1, 2)), None, np.ones((2, 2)), 2))
     after = network.state()
     assert all(np.array_equal(before[name], after[name]) for name in before)

@@ -10,7 +10,7 @@ from ja_learning.core.trial import FACE_SHAPE
 def filled(trials: int, capacity: int) -> ReplayMemory:
     memory = ReplayMemory(capacity)
     for trial in range(trials):
-        memory.add(np.full(FACE_SHAPE, trial % 256, np.uint8), np.full((1 + trial % 3, 2), trial))
+        memory.remember_trial(np.full(FACE_SHAPE, trial % 256, np.uint8), np.full((1 + trial % 3, 2), trial))
     return memory
 
 
@@ -22,7 +22,7 @@ def test_the_newest_are_kept_and_found_by_age(trials, capacity):
     kept = min(trials, capacity)
     assert len(memory) == kept
     ages = np.arange(kept)
-    faces, places = memory.at(ages)
+    faces, places = memory.trials_at(ages)
     newest_first = trials - 1 - ages
     assert np.array_equal(faces[:, 0, 0], newest_first % 256)
     assert np.array_equal(places[:, 0, 0], newest_first)
@@ -31,8 +31,8 @@ def test_the_newest_are_kept_and_found_by_age(trials, capacity):
 
 def test_places_are_padded_as_wide_as_needed():
     memory = filled(3, 10)
-    assert memory.at(np.array([2]))[1].shape == (1, 1, 2)
-    places = memory.at(np.array([[0, 2], [1, 0]]))[1]
+    assert memory.trials_at(np.array([2]))[1].shape == (1, 1, 2)
+    places = memory.trials_at(np.array([[0, 2], [1, 0]]))[1]
     assert places.shape == (2, 2, 3, 2)
     assert np.isnan(places[0, 1, 1:]).all()
 
@@ -41,14 +41,14 @@ def test_of_each_trial_one_of_the_places_seen_is_found():
     memory = ReplayMemory(4)
     for trial in range(5):
         places = np.array([[trial, place] for place in range(1 + trial)])
-        memory.add(np.zeros(FACE_SHAPE, np.uint8), places)
+        memory.remember_trial(np.zeros(FACE_SHAPE, np.uint8), places)
     ages, which = np.array([[0, 1], [2, 3]]), np.array([[0.99, 0.0], [0.4, 0.5]])
     assert memory.places_at(ages, which).tolist() == [[[4, 4], [3, 0]], [[2, 1], [1, 1]]]
 
 
 def test_too_many_candidates_are_cut():
     memory = ReplayMemory(4)
-    memory.add(np.zeros(FACE_SHAPE, np.uint8), np.zeros((MOST_CANDIDATES + 5, 2)))
+    memory.remember_trial(np.zeros(FACE_SHAPE, np.uint8), np.zeros((MOST_CANDIDATES + 5, 2)))
     assert memory.counts(1) == [MOST_CANDIDATES]
 
 
@@ -56,8 +56,8 @@ def test_what_came_before_a_change_can_be_forgotten():
     memory = filled(30, 100)
     memory.keep_newest(4)
     assert len(memory) == 4
-    memory.add(np.zeros(FACE_SHAPE, np.uint8), np.full((1, 2), 99.0))
-    assert np.array_equal(memory.at(np.arange(5))[1][:, 0, 0], [99, 29, 28, 27, 26])
+    memory.remember_trial(np.zeros(FACE_SHAPE, np.uint8), np.full((1, 2), 99.0))
+    assert np.array_equal(memory.trials_at(np.arange(5))[1][:, 0, 0], [99, 29, 28, 27, 26])
 
 
 @pytest.mark.parametrize('trials', [0, 3, 12])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ja_common.core.annotate import annotated
+from ja_common.core.annotate import annotate_image
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.posture import Posture
 from ja_perception.core.blazeface import BlazeFace
@@ -21,7 +21,7 @@ def test_draws_on_a_copy_what_was_found(size):
     posture = Posture(1, np.zeros(2), np.zeros(2))
     percept = SalientFeatureDetector(BlazeFace()).detect(picture, 1, camera, posture)
     before = picture.copy()
-    drawn = annotated(
+    drawn = annotate_image(
         picture, percept.detections, percept.face_image, camera, d_th_rad=0.1, latency_s=0.0123
     )
     assert np.array_equal(picture, before)

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
+from ja_common.executor import CachedWaitSetExecutor
 from ja_common.image_codec import decode_image
 from ja_common.topics import CAMERA_INFO, IMAGE
 from ja_perception.camera_node import CameraNode
@@ -33,7 +33,7 @@ def test_pictures_and_calibration_come_together(ros_context, tmp_path):
     listener.create_subscription(
         CAMERA_INFO.type, 'camera_info', infos.append, IMAGE.subscriber_qos
     )
-    executor = SingleThreadedExecutor(context=ros_context)
+    executor = CachedWaitSetExecutor(context=ros_context)
     executor.add_node(node)
     executor.add_node(listener)
     spin_until(executor, lambda: len(images) >= 3 and len(infos) >= 3)

@@ -92,7 +92,7 @@ def test_without_a_posture_nothing_is_attended_and_memory_starts_anew(finder):
 
 
 def test_face_image_shows_the_look(finder):
-    """The crop differs by much more between looks than between places in the image."""
+    """The crop differs by much more between gazes than between places in the image."""
 
     def crop(look, u):
         picture = room()

@@ -13,7 +13,7 @@ CAMERA = CameraModel.from_field_of_view(160, 120, np.radians(36))
 
 
 def turn(now, before=(0, 0)):
-    """H from one posture to another."""
+    """Return H from one posture to another."""
     return rotation_homography(CAMERA, head_rotation(now), head_rotation(before))
 
 
@@ -46,7 +46,7 @@ def test_nothing_is_expected_after_a_turn_away():
 
 @pytest.mark.parametrize('posture_deg', [(0, 0), (0.4, -0.3), (-0.7, 0.2), (1.5, 1.0), (12, -8)])
 def test_every_pixel_comes_from_where_perspective_says(posture_deg):
-    # Where each pixel comes from, said by the pixel itself: its column, and then its row.
+    # The value of each pixel is its own place: its column, and then its row.
     homography = turn(np.radians(posture_deg))
     rows, columns = np.indices((120, 160)).astype(np.uint8) + np.uint8(1)
     rows_from, columns_from = (expected_image(i, homography) for i in (rows, columns))

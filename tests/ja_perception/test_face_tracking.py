@@ -1,4 +1,4 @@
-"""Faces over time, with a finder that plays a script."""
+"""Faces over time, with a scripted finder."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ class World:
         return faces
 
     def observe(self, pan=0.0, changed=True):
-        """The next image; noise makes every one a changed one."""
+        """Show the tracker the next image; noise changes every one."""
         self.posture = np.array([pan, 0.0])
         self.now_ns += STEP_NS
         self.squares.clear()

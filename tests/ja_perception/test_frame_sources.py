@@ -30,7 +30,7 @@ def video(tmp_path):
 
 
 def names(source, count):
-    """Which colour each of the next frames has."""
+    """Return the colour of each of the next frames."""
     frames = [source.next_frame() for _ in range(count)]
     return ['end' if f is None else 'red' if f[0, 0, 0] > 100 else 'green' for f in frames]
 

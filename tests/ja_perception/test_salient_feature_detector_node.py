@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 import rclpy
 from builtin_interfaces.msg import Time
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
 from ja_common.core.detection import Kind, caregiver_face
 from ja_common.detection_codec import decode_detections
+from ja_common.executor import CachedWaitSetExecutor
 from ja_common.image_codec import decode_image, encode_camera_info, encode_image
 from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import (
@@ -35,13 +35,13 @@ PERIOD_NS = 100_000_000
 
 
 class Rig:
-    """Publishes what a rig would, and keeps all that the detector says."""
+    """Publishes what a rig would, and stores all that the detector publishes."""
 
     def __init__(self, context, **parameters):
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
         self.detector = SalientFeatureDetectorNode(context=context, parameter_overrides=overrides)
         self.node = rclpy.create_node('rig', context=context)
-        self.executor = SingleThreadedExecutor(context=context)
+        self.executor = CachedWaitSetExecutor(context=context)
         self.executor.add_node(self.detector)
         self.executor.add_node(self.node)
         self.heard = []
@@ -51,8 +51,8 @@ class Rig:
             topic.name: self.node.create_publisher(topic.type, topic.name, topic.publisher_qos)
             for topic in (IMAGE, CAMERA_INFO, JOINT_STATES)
         }
-        hears = [p for n, p in self.publishers.items() if n != IMAGE.name or not parameters]
-        self.wait(lambda: all(p.get_subscription_count() for p in hears))
+        subscribed = [p for n, p in self.publishers.items() if n != IMAGE.name or not parameters]
+        self.wait(lambda: all(p.get_subscription_count() for p in subscribed))
 
     def listen(self, topic):
         def keep(message):
@@ -206,7 +206,7 @@ def test_annotated_image_only_for_a_subscriber(rig):
     rig.image(PERIOD_NS, caregiver_and_ball())
     rig.answer()
     rig.listen(IMAGE_ANNOTATED)
-    rig.wait(lambda: rig.detector._says_annotated.get_subscription_count())
+    rig.wait(lambda: rig.detector._annotated_publisher.get_subscription_count())
     rig.joints(2 * PERIOD_NS)
     rig.image(2 * PERIOD_NS, caregiver_and_ball())
     rig.wait(lambda: rig.all_of(IMAGE_ANNOTATED))

@@ -12,7 +12,7 @@ from ja_learning.core.network import ThreeLayerNetwork
 from ja_learning.core.network_config import NetworkConfig
 from ja_recording.core.dataset import TrialSample, read_dataset
 from ja_recording.learner_score import score_learner
-from recorded_days import LOOK, TRIALS, day, recorded, said_in
+from recorded_days import LOOK, TRIALS, day, messages_of, recorded
 from recordings import write_recording
 
 
@@ -47,7 +47,7 @@ def test_a_learner_of_the_data_set_becomes_the_learner_of_the_recording(tmp_path
     weights, _ = load_checkpoint(tmp_path / 'trained' / LAST)
     network = ThreeLayerNetwork(NetworkConfig(), 3)
     for sample in exported(tmp_path, tmp_path / 'monday'):
-        network.learn(sample.trial)
+        network.update(sample.trial)
     for name, array in network.state().items():
         np.testing.assert_array_equal(weights[name], array, err_msg=name)
 
@@ -64,7 +64,7 @@ def test_several_recordings_make_one_data_set(tmp_path):
 
 
 def test_a_recording_without_trials_makes_no_data_set(tmp_path):
-    looks_only = (each for each in said_in(day(2)) if each[0] == 0)
+    looks_only = (each for each in messages_of(day(2)) if each[0] == 0)
     write_recording(tmp_path / 'sunday', looks_only)
     with pytest.raises(ConfigError, match='no trial ended in a fixation'):
         exported(tmp_path, tmp_path / 'sunday')

@@ -14,7 +14,7 @@ from ja_learning.core.network_config import NetworkConfig
 from ja_learning.core.trial import Trial
 from ja_recording.core.reader import Recording
 from ja_recording.learner_score import score_learner, success_rate, write_csv
-from recorded_days import LOOK, TRIALS, day, recorded, said_in
+from recorded_days import LOOK, TRIALS, day, messages_of, recorded
 from recordings import write_recording
 
 
@@ -50,7 +50,7 @@ def test_the_node_learns_what_the_network_learns_from_the_same_trials(tmp_path):
     _, weights = train(recorded(tmp_path / 'r'), tmp_path / 'a', seed=3)
     network = ThreeLayerNetwork(NetworkConfig(), 3)
     for face, attended, _ in day():
-        network.learn(Trial(face, LOOK, LOOK[np.newaxis], attended))
+        network.update(Trial(face, LOOK, LOOK[np.newaxis], attended))
     for name in ('hidden_weights', 'hidden_biases', 'output_weights', 'output_biases'):
         array = network.state()[name]
         np.testing.assert_allclose(weights[name], array, atol=1e-6)
@@ -77,7 +77,7 @@ def test_without_truth_there_is_an_angle_but_no_success(tmp_path):
 
 
 def test_a_recording_without_what_a_learner_needs_is_refused(tmp_path):
-    messages = [each for each in said_in(day()) if each[1] is not FIXATION]
+    messages = [each for each in messages_of(day()) if each[1] is not FIXATION]
     recording = Recording(write_recording(tmp_path / 'r', messages))
     with pytest.raises(ConfigError, match='lacks fixation'):
         score_learner(recording)

@@ -15,7 +15,7 @@ STUBBORN = NodeSpec('dummy_nodes', 'stubborn')
 pytestmark = pytest.mark.usefixtures('domain')
 
 
-def look_until(companion: Companion, condition: Callable[[], object]) -> None:
+def report_until(companion: Companion, condition: Callable[[], object]) -> None:
     end = time.monotonic() + 20.0
     while not condition():
         assert time.monotonic() < end
@@ -23,14 +23,32 @@ def look_until(companion: Companion, condition: Callable[[], object]) -> None:
         time.sleep(0.01)
 
 
-def test_its_death_is_told_once_and_raises_nothing(tmp_path):
-    said: list[str] = []
-    with Companion(TALKER, tmp_path, said.append, announcement='') as companion:
+def test_its_death_is_reported_once_and_raises_nothing(tmp_path):
+    reports: list[str] = []
+    with Companion(TALKER, tmp_path, reports.append, announcement='') as companion:
         companion._process.popen.send_signal(signal.SIGKILL)
-        look_until(companion, lambda: said)
+        report_until(companion, lambda: reports)
         companion.report_events()
-    assert len(said) == 1
-    assert 'talker was killed by SIGKILL' in said[0]
+    assert len(reports) == 1
+    assert 'talker was killed by SIGKILL' in reports[0]
+
+
+def test_the_announcement_in_its_log_is_reported_once(tmp_path, monkeypatch):
+    monkeypatch.setattr('ja_runner.companion._PATIENCE_S', 0.1)
+    reports: list[str] = []
+    with Companion(STUBBORN, tmp_path, reports.append, announcement='[ERROR]') as companion:
+        report_until(companion, lambda: reports)
+        companion.report_events()
+    assert reports == ['[ERROR] [stubborn]: here I stand']
+
+
+def test_one_that_ignores_signals_is_killed_with_the_context(tmp_path, monkeypatch):
+    monkeypatch.setattr('ja_runner.companion._PATIENCE_S', 0.1)
+    reports: list[str] = []
+    with Companion(STUBBORN, tmp_path, reports.append, announcement='[ERROR]') as companion:
+        report_until(companion, lambda: reports)  # it ignores SIGINT from here on
+        popen = companion._process.popen
+    assert popen.wait(5.0) == -signal.SIGKILL
 
 
 def test_it_ends_with_the_context(tmp_path):

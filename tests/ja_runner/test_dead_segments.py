@@ -1,4 +1,4 @@
-"""What killed processes leave in shared memory is removed; what lives is not touched."""
+"""Shared memory of killed processes is removed; that of running processes is not."""
 
 import fcntl
 import os
@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import psutil
 import pytest
 
 from ja_runner.dead_segments import FOLDER, remove_dead_segments
@@ -37,12 +38,12 @@ def test_only_unlocked_old_segments_are_removed(tmp_path):
 
 
 @pytest.mark.usefixtures('domain')
-def test_fast_dds_locks_its_segments_as_long_as_it_lives():
+def test_fast_dds_locks_its_segments_as_long_as_it_runs():
     process = subprocess.Popen([sys.executable, '-c', PARTICIPANT], stdout=subprocess.PIPE)
     try:
         assert process.stdout.readline()
-        maps = Path(f'/proc/{process.pid}/maps').read_text().splitlines()
-        mapped = {line.split()[-1] for line in maps if f'{FOLDER}/fastrtps_' in line}
+        paths = (mapped.path for mapped in psutil.Process(process.pid).memory_maps())
+        mapped = {path for path in paths if path.startswith(f'{FOLDER}/fastrtps_')}
         locks = [Path(f'{path}_el') for path in mapped if 'fastrtps_port' not in path]
         assert locks
         for lock in locks:

@@ -13,14 +13,14 @@ from ja_runner.graph import CONFIG, preset, replace_nodes, rig_graph, sim_graph,
 from ja_runner.node_spec import NodeSpec
 
 
-def test_names_follow_from_the_thing():
+def test_names_follow_from_the_executable():
     spec = NodeSpec('ja_control', 'visual_feedback_controller')
     assert spec.module == 'ja_control.visual_feedback_controller_node'
     assert spec.class_name == 'VisualFeedbackControllerNode'
 
 
 @pytest.mark.parametrize('value', [True, 3, 2.5, 1e-7, 'word', '12', '', 'a: b', [1.0, 2.0]])
-def test_parameters_arrive_as_they_were_meant(value, ros_context):
+def test_parameters_arrive_unchanged(value, ros_context):
     spec = NodeSpec('p', 't', parameters={'value': value})
     node = Node('t', context=ros_context, cli_args=spec.ros_arguments())
     received = node.declare_parameter('value', value).value
@@ -94,10 +94,10 @@ def test_every_configured_parameter_exists_in_the_node_it_is_for(path, ros_conte
     graph = {spec.executable: spec for graph in GRAPHS.values() for spec in graph}
     sections = yaml.safe_load(path.read_text())
     for section, content in sections.items():
-        thing = section.rsplit('/', 1)[-1]
-        if thing == '**':
+        executable = section.rsplit('/', 1)[-1]
+        if executable == '**':
             continue
-        spec = graph[thing]
+        spec = graph[executable]
         node = spec.load()(context=ros_context, cli_args=spec.ros_arguments())
         unknown = [name for name in content['ros__parameters'] if not node.has_parameter(name)]
         node.destroy_node()
@@ -135,12 +135,12 @@ def test_a_node_of_another_package_takes_the_place_and_the_parameters():
     ('swap', 'why'),
     [
         ('gat=ja_sim/scorer', "no node 'gat'"),
-        ('gate', 'PACKAGE/THING'),
-        ('gate=scorer', 'PACKAGE/THING'),
-        ('gate=ja_sim/nobody', 'PYTHONPATH'),
+        ('gate', 'PACKAGE/EXECUTABLE'),
+        ('gate=scorer', 'PACKAGE/EXECUTABLE'),
+        ('gate=ja_sim/missing', 'PYTHONPATH'),
         ('gate=nowhere/scorer', 'PYTHONPATH'),
     ],
 )
-def test_a_swap_that_cannot_be_is_refused_with_the_reason(swap, why):
+def test_an_impossible_replacement_is_refused_with_the_reason(swap, why):
     with pytest.raises(ConfigError, match=why):
         replace_nodes(sim_graph(), [swap])

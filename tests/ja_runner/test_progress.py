@@ -1,4 +1,4 @@
-"""The watcher hears a graph, and tells people."""
+"""The progress node collects the state of a graph, and the display shows it."""
 
 import io
 
@@ -31,7 +31,7 @@ def test_it_counts_trials_and_keeps_the_gates_state(make_bench):
     assert bench.node.elapsed_s > 0
 
 
-def test_a_complaint_is_shown_until_it_is_over(make_bench):
+def test_a_warning_is_shown_until_it_is_over(make_bench):
     bench = make_bench(ProgressNode, publishes=[DIAGNOSTICS])
     bench.publish(
         DIAGNOSTICS, DiagnosticArray(status=[status(DiagnosticStatus.WARN, '/gate', 'no')])

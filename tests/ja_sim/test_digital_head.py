@@ -11,7 +11,7 @@ WIDE_FOCAL = 320 / np.tan(np.radians(30))  # 640 px across 60 degrees
 
 
 def wide_with_dot(direction):
-    """A 640x480 picture, black but for a dot at a direction (pan, tilt) [rad]."""
+    """Return a 640x480 picture, black but for a dot at a direction (pan, tilt) [rad]."""
     x, y = rays_of_directions((0, 0), direction)
     rows, columns = np.indices((480, 640))
     distance = np.hypot(columns - 319.5 - WIDE_FOCAL * x, rows - 239.5 - WIDE_FOCAL * y)

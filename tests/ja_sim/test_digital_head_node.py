@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 
+from ja_common.executor import CachedWaitSetExecutor
 from ja_common.image_codec import encode_image
 from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import CAMERA_INFO, IMAGE, JOINT_COMMANDS, JOINT_STATES, WIDE_IMAGE
@@ -25,7 +25,7 @@ def test_obeys_commands_and_speaks_with_the_stamp_of_the_wide_picture(ros_contex
         )
     wide = rig.create_publisher(WIDE_IMAGE.type, WIDE_IMAGE.name, WIDE_IMAGE.publisher_qos)
     commands = rig.create_publisher(JointState, JOINT_COMMANDS.name, JOINT_COMMANDS.publisher_qos)
-    executor = SingleThreadedExecutor(context=ros_context)
+    executor = CachedWaitSetExecutor(context=ros_context)
     executor.add_node(head)
     executor.add_node(rig)
     spin_until(

@@ -10,7 +10,7 @@ from ja_sim.core.gaze import (
     eye_angles,
     head_angles,
     minimum_jerk,
-    missed,
+    missed_point,
 )
 
 EYES = np.array([[0.08, 0.03, 0.10], [0.08, -0.03, 0.10]])
@@ -39,11 +39,11 @@ def test_each_eye_points_exactly_at_the_target():
 
 def test_a_missed_target_is_as_far_away_but_beside_it():
     target = np.array([0.58, 0.0, 0.10])  # half a metre straight ahead of her eyes
-    point = missed(target, EYES, np.radians([1.0, -2.0]))
+    point = missed_point(target, EYES, np.radians([1.0, -2.0]))
     centre = EYES.mean(axis=0)
     assert np.linalg.norm(point - centre) == pytest.approx(0.5)
     np.testing.assert_allclose(directions_of_vectors(point - centre), np.radians([1.0, -2.0]))
-    np.testing.assert_allclose(missed(target, EYES, np.zeros(2)), target)
+    np.testing.assert_allclose(missed_point(target, EYES, np.zeros(2)), target)
 
 
 def test_eyes_converge_on_what_is_near():

@@ -1,4 +1,4 @@
-"""The Gymnasium environment: its own checker passes, and the reward says what it should."""
+"""The Gymnasium environment: its own checker passes, and the reward is right."""
 
 import subprocess
 import sys

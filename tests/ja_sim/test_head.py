@@ -12,7 +12,7 @@ RNG = np.random.default_rng(0)
 
 
 def trace(head: PanTiltHead, target: list[float], duration_s: float = 1.0) -> np.ndarray:
-    """True posture every millisecond after a command, (T, 2) [rad]."""
+    """Return the true posture every millisecond after a command, (T, 2) [rad]."""
     start_s = head.time_s
     head.command(np.array(target))
     postures = []

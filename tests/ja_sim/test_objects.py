@@ -16,7 +16,7 @@ def arrangement(seed: int = 0, **settings) -> Arrangement:
 
 
 def positions(arranged: Arrangement) -> np.ndarray:
-    return np.array([thing.position for thing in arranged.things])
+    return np.array([thing.position for thing in arranged.objects])
 
 
 @pytest.mark.parametrize('count', [1, 5, 10])
@@ -55,30 +55,30 @@ def test_too_many_objects_for_the_space_are_refused():
 
 def test_replaced_objects_are_new_ones():
     arranged = arrangement(rearranged='replaced')
-    before = arranged.things
+    before = arranged.objects
     arranged.rearrange()
-    assert not {t.identifier for t in before} & {t.identifier for t in arranged.things}
+    assert not {t.identifier for t in before} & {t.identifier for t in arranged.objects}
 
 
 def test_moved_objects_keep_their_looks():
     arranged = arrangement(rearranged='moved')
-    before, places = arranged.things, positions(arranged)
+    before, places = arranged.objects, positions(arranged)
     arranged.rearrange()
-    assert [t.identifier for t in before] == [t.identifier for t in arranged.things]
-    assert [t.colour for t in before] == [t.colour for t in arranged.things]
+    assert [t.identifier for t in before] == [t.identifier for t in arranged.objects]
+    assert [t.colour for t in before] == [t.colour for t in arranged.objects]
     assert np.abs(positions(arranged) - places).min() > 0.0
 
 
 def test_objects_that_stay_stay():
     arranged = arrangement(rearranged='never')
-    before = arranged.things
+    before = arranged.objects
     arranged.rearrange()
-    assert arranged.things is before
+    assert arranged.objects is before
 
 
 def test_colours_are_bright_and_all_different():
     for seed in range(20):
-        colours = np.array([t.colour for t in arrangement(seed, count=10).things])
+        colours = np.array([t.colour for t in arrangement(seed, count=10).objects])
         saturation = 1.0 - colours.min(axis=1) / colours.max(axis=1)
         assert saturation.min() >= 0.8
         difference = np.abs(colours[:, None] - colours).sum(axis=2)
@@ -86,11 +86,11 @@ def test_colours_are_bright_and_all_different():
 
 
 def test_moving_objects_circle_around_their_place():
-    thing = arrangement(count=1, moving_share=1.0).things[0]
+    thing = arrangement(count=1, moving_share=1.0).objects[0]
     path = np.array([thing.position_at(t) for t in np.arange(0.0, 5.0, 0.05)])
     off = np.linalg.norm(path - thing.position, axis=1)
     np.testing.assert_allclose(off, MOTION_RADIUS_M)
     assert np.ptp(path, axis=0)[1:].min() > MOTION_RADIUS_M
-    still = arrangement(count=1, moving_share=0.0).things[0]
+    still = arrangement(count=1, moving_share=0.0).objects[0]
     np.testing.assert_array_equal(still.position_at(3.0), still.position)
     assert np.linalg.norm(still.position_at(3.0, shaken=True) - still.position) > 0.01

@@ -1,4 +1,4 @@
-"""Scenes: the shipped ones load, and a mistake is told with its file and line."""
+"""Scenes: the shipped ones load, and an error names the file and line."""
 
 import pytest
 

@@ -19,15 +19,15 @@ def truth(trial, attended=0, stamp_s=0, in_view=True):
 
 @pytest.fixture
 def score():
-    """A score that has seen the world before the first look."""
+    """Return a score that has seen the world before the first look."""
     score = Score(window=4)
-    score.see(truth(0), None)
+    score.score_image(truth(0), None)
     return score
 
 
 def play(score, trial, fixations, **about):
-    """One trial, an image for each fixation (or None); the outcome of the trial before."""
-    outcomes = [score.see(truth(trial, **about), f if f is None else np.array(f))
+    """Play one trial, an image per fixation (or None); return the trial before's outcome."""
+    outcomes = [score.score_image(truth(trial, **about), f if f is None else np.array(f))
                 for f in fixations]  # fmt: skip
     assert outcomes[1:] == [None] * (len(outcomes) - 1), 'a trial ends with the first of the next'
     return outcomes[0]

@@ -25,7 +25,7 @@ class Course:
         self.image(trial=0)
 
     def image(self, trial, fixation=None, order=(SIM_TRUTH, FIXATION)):
-        """One image: the caregiver means LEFT."""
+        """Publish one image's truth and fixation: the caregiver attends to LEFT."""
         self.stamp_ns += 10**8
         messages = {
             SIM_TRUTH: truth(self.stamp_ns, trial),
@@ -36,7 +36,7 @@ class Course:
         self.bench.wait(lambda: self.bench.received(FIXATION) == self.bench.received(SIM_TRUTH))
 
     def score_after(self, trials):
-        """The score told after so many trials: its message and its values."""
+        """Return the score published after so many trials: its message and its values."""
         heard = self.bench.messages(SCORE)  # latched: only the last is sure to be heard
         self.bench.wait(lambda: heard and heard[-1].message.endswith(f'of {trials} trials'))
         return heard[-1].message, {value.key: value.value for value in heard[-1].values}
@@ -61,8 +61,8 @@ def told_rate(course):
 @pytest.fixture
 def make_course(make_bench):
     def make(**parameters):
-        says, hears = [SIM_TRUTH, FIXATION], [SUCCESS_RATE, SCORE]
-        return Course(make_bench(ScorerNode, says, hears, **parameters))
+        sent, received = [SIM_TRUTH, FIXATION], [SUCCESS_RATE, SCORE]
+        return Course(make_bench(ScorerNode, sent, received, **parameters))
 
     return make
 

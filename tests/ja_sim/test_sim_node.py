@@ -28,7 +28,7 @@ from node_bench import joint_state
 
 PERIOD_NS = 100_000_000
 SIZE = {'image_width': 64, 'image_height': 48}
-HEARS = [IMAGE, CAMERA_INFO, JOINT_STATES, CLOCK, SIM_TRUTH]
+RECEIVED = [IMAGE, CAMERA_INFO, JOINT_STATES, CLOCK, SIM_TRUTH]
 
 
 def stamp(message):
@@ -51,14 +51,14 @@ class Rig:
         self.bench.publish(JOINT_COMMANDS, joint_state(at, *posture))
 
     def step(self, *posture):
-        """Answer the last image; the one that follows."""
+        """Answer the last image; return the one that follows."""
         before = stamp(self.image)
         self.command(*posture)
         self.bench.wait(lambda: stamp(self.image) > before)
         return self.image
 
     def at_image(self, topic):
-        """The message of another topic with the stamp of the last image."""
+        """Return the message of another topic with the stamp of the last image."""
 
         def found():
             return [m for m in self.bench.messages(topic) if stamp(m) == stamp(self.image)]
@@ -71,7 +71,7 @@ class Rig:
 def make_rig(make_bench):
     def make(**parameters):
         parameters = {'scene': 'easy', 'resend_after_s': 0.2, **SIZE, **parameters}
-        return Rig(make_bench(SimNode, [JOINT_COMMANDS], HEARS, **parameters))
+        return Rig(make_bench(SimNode, [JOINT_COMMANDS], RECEIVED, **parameters))
 
     return make
 
@@ -119,7 +119,7 @@ def test_image_that_is_not_answered_is_sent_again_unchanged(make_rig):
 
 
 def run(rig, postures=((0.0, 0.0), (0.1, 0.0), (0.1, 0.1), (0.0, 0.0))):
-    """The pictures seen on a course of commands."""
+    """Return the pictures seen on a course of commands."""
     return [bytes(rig.step(*posture).data) for posture in postures]
 
 

@@ -23,7 +23,7 @@ AWAY = np.radians([25.0, 5.0])
 
 
 def scene(**parts: dict) -> Scene:
-    """The default scene with some settings of some parts changed."""
+    """Return the default scene with some settings of some parts changed."""
     base = load_scene('default')
     return replace(
         base, **{name: replace(getattr(base, name), **change) for name, change in parts.items()}
@@ -44,7 +44,7 @@ def make_world() -> Iterator[Callable[..., JointAttentionWorld]]:
 
 
 def run(world: JointAttentionWorld, steps: int = 25) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Pictures and encoder readings of a run that looks around and back at her."""
+    """Return pictures and encoder readings of a run that looks around and back at her."""
     rng = np.random.default_rng(5)
     images, readings = [], []
     for step in range(steps):
@@ -84,11 +84,11 @@ def test_looking_changes_nothing(make_world):
             world.command(AWAY * (step % 2))
             world.step(0.05)
             if world is watched:
-                world.picture(head=np.radians([40.0, 0.0]))
+                world.render_picture(head=np.radians([40.0, 0.0]))
                 world.truth()
                 world.joint_state()
     np.testing.assert_array_equal(watched.joint_state().position, blind.joint_state().position)
-    np.testing.assert_array_equal(watched.picture(), blind.picture())
+    np.testing.assert_array_equal(watched.render_picture(), blind.render_picture())
 
 
 def test_other_seeds_give_other_worlds(make_world):
@@ -182,7 +182,7 @@ def test_an_unreliable_caregiver_looks_elsewhere(make_world):
 
 def test_in_view_at_look_is_about_the_moment_of_the_look(make_world):
     world = make_world()
-    told = []
+    in_view = []
     for _ in range(30):
         world.command(AWAY)
         world.step(0.2)
@@ -192,8 +192,8 @@ def test_in_view_at_look_is_about_the_moment_of_the_look(make_world):
         x, y = rays_of_directions([0.0, 0.0], truth.directions[truth.attended])
         shown = abs(x) < np.tan(np.radians(18.0)) and abs(y) < np.tan(np.radians(13.5))
         assert truth.in_view_at_look == shown
-        told.append(truth.in_view_at_look)
-    assert 0 < sum(told) < 30
+        in_view.append(truth.in_view_at_look)
+    assert 0 < sum(in_view) < 30
 
 
 def test_an_attended_object_can_be_shaken_or_held(make_world):
@@ -217,7 +217,7 @@ def test_an_attended_object_can_be_shaken_or_held(make_world):
     for world in (still, holding):
         world.command(world.truth().directions[world.truth().attended])
         world.step(0.2)
-        pictures.append(world.picture().astype(int))
+        pictures.append(world.render_picture().astype(int))
     assert np.abs(pictures[0] - pictures[1]).max(axis=2).astype(bool).mean() > 0.005
 
 
@@ -291,7 +291,7 @@ def test_a_bad_command_is_refused_and_changes_nothing(make_world, bad):
     world = make_world()
     world.command(AWAY)
     world.step(0.2)
-    with pytest.raises(ValueError, match='two finite angles'):
+    with pytest.raises(ValueError, match='two finite numbers'):
         world.command(np.array(bad))
     world.step(0.2)
     np.testing.assert_allclose(world.joint_state().position, AWAY, atol=1e-4)
@@ -320,7 +320,7 @@ def test_an_unknown_identity_is_refused_with_the_known_ones():
 
 @pytest.mark.parametrize('turn_deg', [0.0, 40.0, -60.0])
 def test_a_face_detector_finds_her(make_world, turn_deg):
-    """A frontal or a profile cascade of OpenCV, that never saw a rendered face."""
+    """OpenCV's frontal and profile cascades were not trained on rendered faces."""
     cascades = [
         cv2.CascadeClassifier(cv2.data.haarcascades + f'haarcascade_{name}.xml')
         for name in ('frontalface_alt2', 'profileface')
@@ -328,7 +328,7 @@ def test_a_face_detector_finds_her(make_world, turn_deg):
     found = 0
     for name in identities()[:4]:
         world = make_world(scene(caregiver={'identity': name}), size=(320, 240))
-        picture = world.picture(head=np.radians([turn_deg, 5.0]), eyes_closed=False)
+        picture = world.render_picture(head=np.radians([turn_deg, 5.0]), eyes_closed=False)
         grey = cv2.resize(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), None, fx=2, fy=2)
         hits = [
             box
@@ -342,7 +342,7 @@ def test_a_face_detector_finds_her(make_world, turn_deg):
 
 
 def test_eyes_alone_are_visible(make_world):
-    """Without a turn of the head, the whites of the eyes tell where she looks."""
+    """Without a turn of the head, the whites of the eyes show where she looks."""
     still = {'head_share': (0.0, 0.0), 'head_noise_deg': 0.0, 'blink_rate_hz': 0.0}
     world = make_world(scene(caregiver=still), size=(320, 240))
     before = world.observe().image.astype(int)
@@ -379,7 +379,7 @@ def test_missing_graphics_name_the_packages(monkeypatch):
     monkeypatch.setattr(graphics.ctypes.util, 'find_library', lambda name: None)
     with pytest.raises(RenderError, match='apt install libegl1 libgl1-mesa-dri'):
         JointAttentionWorld(load_scene('default'), 0, SMALL).observe()
-    # A library that is named but missing is told before MuJoCo fails to load it.
+    # A named library that is missing is reported before MuJoCo fails to load it.
     monkeypatch.setenv('MUJOCO_GL', 'osmesa')
     with pytest.raises(RenderError, match='MUJOCO_GL=osmesa is not there'):
         graphics.require_named_backend()
@@ -389,15 +389,15 @@ def test_osmesa_is_the_fallback(monkeypatch):
     monkeypatch.delenv('MUJOCO_GL', raising=False)
     only_osmesa = {'OSMesa': 'libOSMesa.so.8'}
     monkeypatch.setattr(graphics.ctypes.util, 'find_library', only_osmesa.get)
-    assert graphics.backend() == 'osmesa'
+    assert graphics.choose_backend() == 'osmesa'
 
 
-def assert_ends_without_complaint(code):
+def assert_ends_without_an_error(code):
     ran = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stderr) == (0, '')
 
 
-def test_a_world_that_nobody_closed_ends_without_complaint():
+def test_a_world_that_was_not_closed_ends_without_an_error():
     """Also where another library registered finalizers first: they run in the reverse order."""
     code = (
         'import weakref\n'
@@ -409,11 +409,11 @@ def test_a_world_that_nobody_closed_ends_without_complaint():
         "world = JointAttentionWorld(load_scene('easy'), 0, (32, 24))\n"
         'world.observe()\n'
     )
-    assert_ends_without_complaint(code)
+    assert_ends_without_an_error(code)
 
 
-def test_a_world_that_another_thread_still_holds_at_the_end_does_not_complain_either():
-    """As a sim node does that Ctrl-C reaches while its first picture is drawn."""
+def test_a_world_that_another_thread_still_holds_at_the_end_logs_no_error_either():
+    """The case of a sim node that gets Ctrl-C while its first picture is drawn."""
     code = (
         'import atexit, threading\n'
         'kept, drawn = [], threading.Event()\n'
@@ -428,4 +428,4 @@ def test_a_world_that_another_thread_still_holds_at_the_end_does_not_complain_ei
         'threading.Thread(target=draw, daemon=True).start()\n'
         'drawn.wait()\n'
     )
-    assert_ends_without_complaint(code)
+    assert_ends_without_an_error(code)

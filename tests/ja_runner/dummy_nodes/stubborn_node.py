@@ -5,6 +5,7 @@ import time
 
 
 def main() -> None:
+    """Log one error, and ignore signals."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     print('[ERROR] [stubborn]: here I stand', flush=True)

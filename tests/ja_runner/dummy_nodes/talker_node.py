@@ -1,4 +1,4 @@
-"""`talker`: says a parameter's value, again and again; `crash` in it ends the process."""
+"""`talker`: publishes a parameter's value repeatedly; the value `crash` ends the process."""
 
 import os
 import sys
@@ -12,15 +12,17 @@ from ja_common.graph_node import spin_node
 
 
 class TalkerNode(Node):
+    """Publishes its parameter `text` and its name."""
+
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('talker', **node_kwargs)
         self.text = self.declare_parameter('text', 'hello').value
         if self.text == 'bad':
             raise ConfigError('talker: parameter text = bad cannot be used')
         self.pub = self.create_publisher(String, 'chatter', 10)
-        self.create_timer(0.02, self.talk)
+        self.create_timer(0.02, self.publish_text)
 
-    def talk(self) -> None:
+    def publish_text(self) -> None:
         if self.text == 'crash':
             print('[ERROR] [talker]: the wheel came off', file=sys.stderr, flush=True)
             os._exit(7)
@@ -28,4 +30,5 @@ class TalkerNode(Node):
 
 
 def main(args: list[str] | None = None) -> None:
+    """Run the node until a signal."""
     spin_node(TalkerNode, args)

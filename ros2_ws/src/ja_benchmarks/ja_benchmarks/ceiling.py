@@ -1,4 +1,4 @@
-"""How well anybody could do: the success of observers who see her gaze, or her head, exactly."""
+"""The best possible success: observers that see her gaze, or her head, exactly."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ja_common.core.geometry import (
     directions_of_vectors,
     vectors_of_directions,
 )
-from ja_sim.core.gaze import missed
+from ja_sim.core.gaze import missed_point
 from ja_sim.core.objects import Arrangement
 from ja_sim.core.scene import Scene, load_scene
 
@@ -21,18 +21,19 @@ _TO_HER_FRAME = np.array([-1.0, -1.0, 1.0])
 
 
 def ceiling(trials: int = 8000) -> dict[str, Row]:
-    """Success of who sees exactly where her eyes, or her head, point, but not how far it is.
+    """Return the success of observers that know the direction of her eyes, or of her head.
 
-    Her eyes miss what she looks at by a little, as the scene says. Who sees them asks of every
-    object how near it is to the line of gaze, or, as a network with one pair of outputs must,
-    turns the gaze into the most likely direction first. Who sees her head alone asks which object
-    makes its angles most probable: her eyes are too small in the picture to be of much help.
+    No observer knows the distance of the attended object. Her eyes miss it by a small angle that
+    the scene sets. An observer of the eyes takes the object nearest to the line of gaze; or, as a
+    network with one pair of outputs must, it first turns the gaze into the most likely direction.
+    An observer of the head takes the object that makes the head's angles most probable; her eyes
+    are so small in the picture that they help little.
     """
     rows: dict[str, Row] = {}
     for count in (5, 10):
         scene = load_scene('default')
         scene = dataclasses.replace(scene, objects=dataclasses.replace(scene.objects, count=count))
-        # She attends to the first of each row; the order of drawing means nothing.
+        # She attends to the first object of each row; the order of drawing has no influence.
         positions = _arrangements(scene, trials)
         directions = directions_of_vectors(positions)
         looked_at = _looked_at(scene, positions[:, 0])
@@ -57,24 +58,24 @@ def _face(scene: Scene) -> np.ndarray:
 
 
 def _arrangements(scene: Scene, trials: int) -> np.ndarray:
-    """Positions of the objects (T, N, 3) [m] as the world draws them."""
+    """Return positions of the objects (T, N, 3) [m] as the world draws them."""
     arrangement = Arrangement(scene.objects, _face(scene), np.random.default_rng(0))
     places = []
     for _ in range(trials):
         arrangement.rearrange()
-        places.append([thing.position for thing in arrangement.things])
+        places.append([thing.position for thing in arrangement.objects])
     return np.array(places)
 
 
 def _looked_at(scene: Scene, attended: np.ndarray) -> np.ndarray:
-    """Where her eyes point (T, 3) [m] when she attends to things at (T, 3) [m]."""
+    """Return where her eyes point (T, 3) [m] when she attends to objects at (T, 3) [m]."""
     rng, deviation = np.random.default_rng(1), np.radians(scene.caregiver.gaze_noise_deg)
     eyes = np.broadcast_to(_face(scene), (2, 3))
-    return np.array([missed(each, eyes, rng.normal(0.0, deviation, 2)) for each in attended])
+    return np.array([missed_point(each, eyes, rng.normal(0.0, deviation, 2)) for each in attended])
 
 
 def _one_guess(gaze: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """Mean direction (T, 2) of what is attended to, given the gaze (T, 2): a cubic fit."""
+    """Return the mean direction (T, 2) [rad] of the attended object: a cubic fit of the gaze."""
     yaw, pitch = gaze.T
     powers = [yaw**i * pitch**j for i in range(4) for j in range(4 - i)]
     features = np.stack(powers, axis=1)
@@ -82,7 +83,7 @@ def _one_guess(gaze: np.ndarray, directions: np.ndarray) -> np.ndarray:
 
 
 def _along_gaze(scene: Scene, attended: np.ndarray, steps: int = 60) -> np.ndarray:
-    """Points (T, steps, 3) [m] of each line of gaze at which the scene allows an object.
+    """Return points (T, steps, 3) [m] of each line of gaze at which the scene allows an object.
 
     The ends are where the line leaves the shell of allowed distances from the robot.
     """
@@ -104,10 +105,10 @@ def _along_gaze(scene: Scene, attended: np.ndarray, steps: int = 60) -> np.ndarr
 def _likelihood_of_head(
     scene: Scene, looked_at: np.ndarray, directions: np.ndarray, steps: int = 17
 ) -> np.ndarray:
-    """How probable each object at directions (T, N, 2) makes her head's angles, (T, N).
+    """Return the likelihood (T, N) of her head's angles for each object at directions (T, N, 2).
 
-    How far away an object is, and what share of the gaze her head takes, are not known: all that
-    the scene allows is equally likely.
+    The distance of the object and the head's share of the gaze are not known: all values that the
+    scene allows are equally likely.
     """
     spec, face = scene.caregiver, _face(scene)
     rng = np.random.default_rng(2)

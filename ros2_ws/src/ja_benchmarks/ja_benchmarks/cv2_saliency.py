@@ -1,8 +1,9 @@
-"""The saliency maps of opencv-contrib on pictures of a folder; a process of its own.
+"""The saliency maps of opencv-contrib on pictures of a folder, run as a separate process.
 
-opencv-contrib and the OpenCV of this project exclude each other in one process, so this runs with
-the former in PYTHONPATH: ``python _cv2_saliency.py FOLDER``. It prints, for each method, the place
-of the most salient region in each picture and the processor time: {method: [[u, v, seconds]]}.
+opencv-contrib and the OpenCV of this project cannot be loaded in one process, so this runs with
+opencv-contrib in PYTHONPATH: ``python cv2_saliency.py FOLDER``. It prints, for each method, the
+place of the most salient region in each picture and the processor time:
+{method: [[u, v, seconds]]}.
 """
 
 import json
@@ -16,7 +17,7 @@ import numpy as np
 
 
 def main() -> None:
-    """Judge all pictures of the folder, in the order of their names."""
+    """Find the most salient region in all pictures of the folder, in the order of their names."""
     cv2.setNumThreads(1)
     saliency: Any = getattr(cv2, 'saliency')  # noqa: B009 - opencv-contrib has it, headless not
     methods = {
@@ -36,7 +37,7 @@ def main() -> None:
 
 
 def _strongest_region(saliency: np.ndarray) -> tuple[float, float]:
-    """Centre of the region with the most saliency above Otsu's threshold [px]."""
+    """Return the centre [px] of the region with the most saliency above Otsu's threshold."""
     scaled = cv2.normalize(saliency, None, 0, 255, cv2.NORM_MINMAX).astype(np.uint8)
     _, mask = cv2.threshold(scaled, 0, 1, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
     count, labels, _, centres = cv2.connectedComponentsWithStats(mask)

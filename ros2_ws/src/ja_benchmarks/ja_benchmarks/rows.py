@@ -20,7 +20,7 @@ class Row(TypedDict):
 
 
 def row(samples: ArrayLike, unit: str, statistic: Callable[..., Any] = np.mean) -> Row:
-    """A statistic of samples, shape (n,), and its interval by bootstrap (seeded: repeatable)."""
+    """Return a statistic of samples (n,) with its interval by bootstrap (seeded: repeatable)."""
     values = np.asarray(samples, float)
     found = bootstrap(
         (values,), statistic, method='percentile', n_resamples=2000, rng=np.random.default_rng(0)
@@ -34,12 +34,12 @@ def row(samples: ArrayLike, unit: str, statistic: Callable[..., Any] = np.mean) 
 
 
 def percentile_99(values: np.ndarray, axis: int = -1) -> Any:
-    """The 99th percentile, as a statistic for `row`."""
+    """Compute the 99th percentile, as a statistic for `row`."""
     return np.percentile(values, 99, axis=axis)
 
 
 def success_row(shares: ArrayLike) -> Row:
-    """Mean over seeds of a share of successes, (seeds,), and its 95 % interval."""
+    """Return the mean over seeds of a share of successes (seeds,) with its 95 % interval."""
     estimate = over_seeds(shares)
     return {
         'value': estimate.mean,
@@ -50,7 +50,7 @@ def success_row(shares: ArrayLike) -> Row:
 
 
 def share_row(hits: ArrayLike, unit: str = 'share') -> Row:
-    """Share of independent trials that succeeded, of bools (n,), and its 95 % interval."""
+    """Return the share of true values of independent trials (n,) with its 95 % interval."""
     hits = np.asarray(hits)
     interval = wilson_interval(int(hits.sum()), len(hits))
     return {
@@ -62,7 +62,7 @@ def share_row(hits: ArrayLike, unit: str = 'share') -> Row:
 
 
 def mean_row(values: ArrayLike, unit: str) -> Row:
-    """Mean of independent values (n,), and its 95 % interval."""
+    """Return the mean of independent values (n,) with its 95 % interval."""
     values = np.asarray(values, float)
     mean, error = float(values.mean()), float(values.std(ddof=1) / np.sqrt(len(values)))
     interval = [mean - 1.96 * error, mean + 1.96 * error]

@@ -1,4 +1,4 @@
-"""The one door to every benchmark: `./ja bench [NAME] [--json FILE]`.
+"""Run the benchmarks: `./ja bench [NAME] [--json FILE]`.
 
 A benchmark is a module in the folder below, with `run() -> {figure: row}`; its name is the
 module's. A row is `{'value', 'unit', 'n', 'interval'}`: n samples, and the 95 % interval of the
@@ -21,14 +21,14 @@ FOLDER = 'ja_benchmarks.benchmarks'
 
 
 def benchmarks() -> dict[str, str]:
-    """Names and modules of all benchmarks that are installed."""
+    """Return the names and modules of all installed benchmarks."""
     package = importlib.import_module(FOLDER)
     names = sorted(module.name for module in pkgutil.iter_modules(package.__path__))
     return {name: f'{FOLDER}.{name}' for name in names}
 
 
 def run_benchmarks(name: str | None, json_file: Path | None) -> int:
-    """Run one or all: tables on the terminal, figures to `json_file`; the exit code.
+    """Run one or all: tables on the terminal, figures to `json_file`; return the exit code.
 
     Raises ConfigError for an unknown name, or for a file that cannot be written.
     """
@@ -43,13 +43,15 @@ def run_benchmarks(name: str | None, json_file: Path | None) -> int:
             rows = importlib.import_module(known[each]).run()
         Console().print(table_of(each, rows))
         figures |= {f'{each}/{figure}': row for figure, row in rows.items()}
-        if json_file is not None:  # after each: an interrupted run keeps what it has
+        if (
+            json_file is not None
+        ):  # after each benchmark, so that an interrupted run keeps its figures
             json_file.write_text(json.dumps(figures, indent=2) + '\n')
     return 0
 
 
 def table_of(name: str, rows: Mapping[str, Row]) -> Table:
-    """The figures of one benchmark, for people."""
+    """Return the table of figures of one benchmark."""
     table = Table(title=f'bench {name}', title_justify='left')
     for column in ('figure', 'value', '95 % interval', 'unit', 'n'):
         table.add_column(column, justify='left' if column in ('figure', 'unit') else 'right')

@@ -1,1 +1,1 @@
-"""Starts the graph: composition, configuration, supervision, progress, benchmarks."""
+"""The commands of `./ja`."""

@@ -1,8 +1,8 @@
 """A course: exams of the learner alone before and after practice, so that learning shows.
 
-In an exam every shift follows the learner (p(LM) = 1) and nothing is learned; in practice the gate
-and the learner work as they were configured. The learner never hears of it: the course only sets
-public parameters and calls public services, as anybody may.
+In an exam every gaze shift follows the learner (p(LM) = 1) and nothing is learned; in practice the
+gate and the learner work as they were configured. The course only sets public parameters and calls
+public services, as any node may.
 """
 
 from collections.abc import Sequence
@@ -19,13 +19,13 @@ from ja_runner.progress import ProgressNode
 
 _GATING = ('gating', 'p_lm_max')
 _LEARNER_ALWAYS = ('constant', 1.0)
-# A graph that no longer answers does not keep the course from its end.
+# The course ends even if the graph no longer answers.
 _SWITCH_WITHIN_S = 10.0
 
 
 @dataclass(frozen=True)
 class Stage:
-    """Part of a course: so many trials, at most so many seconds."""
+    """A part of a course: a number of trials, and a time limit [s]."""
 
     name: str
     trials: int
@@ -34,7 +34,7 @@ class Stage:
 
 
 def standard_course(trials: int, time_s: float, exam_trials: int) -> list[Stage]:
-    """Exam, practice, exam; without exams when `exam_trials` is 0."""
+    """Return exam, practice, exam; only practice when `exam_trials` is 0."""
     practice = Stage('practice', trials, time_s, learner_alone=False)
     if not exam_trials:
         return [practice]
@@ -53,7 +53,7 @@ class _State(Enum):
 
 
 class Course:
-    """Leads a running graph through the stages; `tick` it after every spin."""
+    """Leads a running graph through the stages; call `tick` after every spin."""
 
     def __init__(self, node: ProgressNode, stages: Sequence[Stage]) -> None:
         self._node = node
@@ -62,13 +62,13 @@ class Course:
         self._learning = node.create_client(SetBool, 'learning_enabled')
         self._state = _State.ASKING
         self._configured: tuple[Any, ...] = ()
-        self._answers: list[Any] = []
+        self._responses: list[Any] = []
         self._first_trial = 0
         self._began_s = 0.0
         node.curve.stage = ''
 
     def tick(self) -> bool:
-        """Is the course over?"""
+        """Advance the course; return True when it is over."""
         if self._state is _State.ASKING:
             self._ask()
         elif self._state is _State.SWITCHING:
@@ -79,11 +79,11 @@ class Course:
         return self._state is _State.DONE
 
     def _ask(self) -> None:
-        if not self._answers:
+        if not self._responses:
             if self._gate.services_are_ready() and self._learning.service_is_ready():
-                self._answers = [self._gate.get_parameters(list(_GATING))]
-        elif self._answers[0].done():
-            values: list[ParameterValue] = self._answers[0].result().values
+                self._responses = [self._gate.get_parameters(list(_GATING))]
+        elif self._responses[0].done():
+            values: list[ParameterValue] = self._responses[0].result().values
             self._configured = tuple(parameter_value_to_python(value) for value in values)
             self._switch()
 
@@ -96,7 +96,7 @@ class Course:
         parameters = [
             Parameter(name, value=value) for name, value in zip(_GATING, gating, strict=True)
         ]
-        self._answers = [
+        self._responses = [
             self._gate.set_parameters(parameters),
             self._learning.call_async(SetBool.Request(data=not alone)),
         ]
@@ -107,7 +107,7 @@ class Course:
     def _wait_for_the_switch(self) -> None:
         curve = self._node.curve
         late = self._node.elapsed_s - self._began_s > _SWITCH_WITHIN_S
-        if not (late or all(answer.done() for answer in self._answers)):
+        if not (late or all(response.done() for response in self._responses)):
             self._first_trial = len(curve.records) + 1  # the trial under way belongs to neither
         elif late or len(curve.records) >= self._first_trial:
             self._first_trial = len(curve.records)

@@ -1,4 +1,4 @@
-"""The main job: a simulated head learns joint attention, before your eyes."""
+"""The demo: a simulated head learns joint attention while you watch."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,10 +19,10 @@ def run_demo(
     view: bool = False,
     resume: Path | None = None,
 ) -> int:
-    """Lead the graph through the stages of a course; summary, curve and exit code.
+    """Lead the graph through the stages of a course and print a summary; return the exit code.
 
-    `resume`: the folder of a run, in which learner and gate go on where they were; ConfigError
-    when it holds nothing to go on from.
+    `resume`: the folder of a run whose learner and gate continue from where they ended. Raises
+    ConfigError when that folder holds no checkpoint.
     """
     if resume is not None:
         check_memory(resume)
@@ -34,7 +34,7 @@ def run_demo(
             course.append(Course(node, stages))
         return course[0].tick()
 
-    code, watcher = run_graph(
+    code, progress = run_graph(
         graph,
         folder,
         'Joint attention, simulated head',
@@ -45,26 +45,26 @@ def run_demo(
         arguments=arguments,
         memory=resume,
     )
-    for line in summary(watcher, stages):
+    for line in summary(progress, stages):
         print(line)
-    if watcher.curve.records:
-        # matplotlib only now: before the run it would keep the first node waiting.
+    if progress.curve.records:
+        # matplotlib is imported late: before the run it would delay the first node.
         from ja_bringup.success_curve import draw_png, write_csv
 
-        print(f'success curve: {write_csv(watcher.curve, folder)}')
-        print(f'               {draw_png(watcher.curve, folder, WINDOW_TRIALS)}')
+        print(f'success curve: {write_csv(progress.curve, folder)}')
+        print(f'               {draw_png(progress.curve, folder, WINDOW_TRIALS)}')
     return code
 
 
-def summary(watcher: ProgressNode, stages: Sequence[Stage]) -> list[str]:
-    """The run in a few lines."""
-    curve = watcher.curve
+def summary(progress: ProgressNode, stages: Sequence[Stage]) -> list[str]:
+    """Summarise the run in a few lines."""
+    curve = progress.curve
     if not curve.records:
         return ['no trial was finished']
-    seconds = max(watcher.elapsed_s, 1e-9)
+    seconds = max(progress.elapsed_s, 1e-9)
     lines = [
         f'{len(curve.records)} trials in {seconds:.0f} s: {len(curve.records) / seconds:.1f} '
-        f'trials/s, {watcher.images / seconds:.0f} images/s'
+        f'trials/s, {progress.images / seconds:.0f} images/s'
     ]
     for stage in stages:
         if stage.learner_alone:
@@ -78,4 +78,4 @@ def summary(watcher: ProgressNode, stages: Sequence[Stage]) -> list[str]:
             f'success, {name + ":":28} {curve.rate(part, stage.name)}'
             for name, part in parts.items()
         ]
-    return [*lines, f'chance, one object of {watcher.objects}: {1 / watcher.objects:.2f}']
+    return [*lines, f'chance, one object of {progress.objects}: {1 / progress.objects:.2f}']

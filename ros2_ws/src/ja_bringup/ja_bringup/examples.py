@@ -1,4 +1,4 @@
-"""An example or two for every command: the end of its `--help`, and what a test tries to parse."""
+"""Examples for every command: the end of its `--help`; a test parses each of them."""
 
 import typer
 
@@ -7,8 +7,8 @@ EXAMPLES: dict[str, dict[str, str]] = {
         './ja demo': 'one minute: exam, practice, exam',
         './ja demo --learner paper --trials 2000 --time 600': "the paper's network needs more",
         './ja demo --scene default --record --one-process': 'a harder scene, all of it recorded',
-        './ja demo --resume runs/X-demo': 'go on from what an earlier run has learned',
-        './ja demo --swap gate=my_lab/my_gate --ros-args -p max_shifts:=3': 'a node of yours',
+        './ja demo --resume runs/X-demo': 'resume an earlier run with all that it learned',
+        './ja demo --swap gate=my_lab/my_gate --ros-args -p max_shifts:=3': 'a node of your own',
     },
     'rig': {
         './ja rig --source 0': 'a webcam, and a digital head in its picture',
@@ -21,7 +21,7 @@ EXAMPLES: dict[str, dict[str, str]] = {
         './ja figures --data data/monday': 'on recorded faces (./ja export)',
     },
     'sweep': {
-        './ja sweep grid.yaml --workers 2': 'a grid of experiments; run again, it goes on',
+        './ja sweep grid.yaml --workers 2': 'a grid of experiments; the same line resumes it',
         './ja sweep grid.yaml --scheduler tcp://cluster:8786': 'on a Dask cluster',
     },
     'bench': {
@@ -47,7 +47,7 @@ EXAMPLES: dict[str, dict[str, str]] = {
         './ja export runs/X-record --to data/monday': 'one recording',
         './ja export runs/X-record runs/Y-record --to data/both --licence CC-BY-4.0': 'several',
         './ja export runs/X-record --to data/demo --ros-args -p look_around:=both_sides': (
-            'of ./ja demo --record, whose robot glances aside'
+            'of ./ja demo --record, whose robot looks around'
         ),
     },
     'faults': {
@@ -72,13 +72,13 @@ EXAMPLES: dict[str, dict[str, str]] = {
         'ROS_DOMAIN_ID=7 ./ja topics --time 10 --json': 'of another one, counted for longer',
     },
 }
-"""By command: lines to type, and what each is for."""
+"""By command: lines to type, and the purpose of each."""
 
 
-def show_examples(app: typer.Typer) -> None:
-    """Put them below the options of every command that is registered."""
+def add_examples(app: typer.Typer) -> None:
+    """Add the examples below the options of every registered command."""
     for command in app.registered_commands:
         name = command.name or command.callback.__name__  # type: ignore[union-attr]
         lines = [f'{line}   # {purpose}' for line, purpose in EXAMPLES.get(name, {}).items()]
-        # Each a paragraph: lines would be filled.
+        # A paragraph for each line: lines of one paragraph would be joined.
         command.epilog = '\n\n'.join(['Examples:', *lines])

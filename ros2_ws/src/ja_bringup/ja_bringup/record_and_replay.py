@@ -1,4 +1,4 @@
-"""`./ja record` and `./ja replay`: one node in the terminal, and how far it has come."""
+"""`./ja record` and `./ja replay`: run one node, with its progress on the terminal."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ from ja_runner.one_process import run_in_one_process
 
 
 def record(parameters: Mapping[str, Any], time_s: float, arguments: Sequence[str]) -> int:
-    """Record until a signal, or for `time_s` (0: no end); the exit code."""
+    """Record until a signal, or for `time_s` (0: no end); return the exit code."""
     spec = NodeSpec('ja_recording', 'recorder', parameters, arguments=arguments)
     columns = (TextColumn('recording'), TextColumn('{task.description}'))
     with Progress(*columns, transient=True) as progress:
@@ -42,7 +42,7 @@ def record(parameters: Mapping[str, Any], time_s: float, arguments: Sequence[str
 
 
 def replay(parameters: Mapping[str, Any], arguments: Sequence[str]) -> int:
-    """Play a recording to its end; the exit code."""
+    """Play a recording to its end; return the exit code."""
     warn_of_unfinished(Recording(Path(parameters['recording'])))
     spec = NodeSpec('ja_recording', 'player', parameters, arguments=arguments)
     columns = (

@@ -1,4 +1,4 @@
-"""What `./ja replay --score` and `./ja export` do with the trials of recordings."""
+"""The trials of recordings, for `./ja replay --score` and `./ja export`."""
 
 import json
 import math
@@ -22,7 +22,7 @@ _BLOCK_TRIALS = 50
 
 
 def score(path: Path, csv_file: Path | None, as_json: bool, arguments: Sequence[str]) -> int:
-    """Teach a learner the trials of a recording, and print its curve; the exit code."""
+    """Train a learner on the trials of a recording, print its curve; return the exit code."""
     check_ros_arguments(arguments)
     recording = Recording(path)
     warn_of_unfinished(recording)
@@ -49,7 +49,7 @@ def score(path: Path, csv_file: Path | None, as_json: bool, arguments: Sequence[
 
 
 def export(paths: Sequence[Path], folder: Path, licence: str, arguments: Sequence[str]) -> int:
-    """Turn recordings into one data set of trials; the exit code."""
+    """Turn recordings into one data set of trials; return the exit code."""
     check_ros_arguments(arguments)
     recordings = {path: Recording(path) for path in paths}
 
@@ -66,21 +66,21 @@ def export(paths: Sequence[Path], folder: Path, licence: str, arguments: Sequenc
 
 
 def sample_of(trial: RecordedTrial, recording: str) -> TrialSample:
-    """A recorded trial as a row of a data set."""
+    """Return a recorded trial as a row of a data set."""
     return TrialSample(
-        trial.lesson,
+        trial.trial,
         recording,
         trial.look_ns,
         trial.fixation_ns,
         trial.source,
-        trial.meant,
-        trial.is_joint_attention(trial.lesson.led_to),
+        trial.attended_direction,
+        trial.is_joint_attention(trial.trial.led_to),
     )
 
 
 @contextmanager
 def _bar(recording: Recording, name: str) -> Iterator[Callable[[int], None]]:
-    """How far a recording has been read; gives what is told the time of each message."""
+    """Show how far a recording is read; yield a function that takes each message's stamp [ns]."""
     columns = (TextColumn('{task.description}'), BarColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(name, total=recording.last_ns - recording.first_ns)

@@ -1,6 +1,6 @@
 """The pages docs/topics.md and docs/parameters.md and the SROS2 policy, from the running code.
 
-Every node is started once in a private context, and asked what it hears, says, offers and takes.
+Every node is started once in a private context; its topics, services and parameters are listed.
 """
 
 from collections import defaultdict
@@ -11,9 +11,7 @@ from tempfile import TemporaryDirectory
 
 import cv2
 import numpy as np
-import rclpy
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.context import Context
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
@@ -22,6 +20,7 @@ from rosgraph_msgs.msg import Clock
 from ja_bringup.sros_policy import policy_xml
 from ja_common.graph_node import GraphNode
 from ja_common.parameters import UNBOUNDED
+from ja_common.private_context import private_context
 from ja_common.qos_text import offered_text
 from ja_common.rclpy_private import parameter_names
 from ja_common.topics import CLOCK, TOPICS
@@ -44,22 +43,26 @@ COMPANIONS = (
     NodeSpec('ja_recording', 'recorder'),
     NodeSpec('ja_recording', 'player'),
 )
-"""Beside the graph, and no part of it: what they hear and say is whatever there is."""
+"""Nodes beside the graph: they subscribe to and publish any topic that there is."""
 
-# What the page says of the parameters that `_stand_ins` sets.
-_STOOD_IN_FOR = {'source': '(must be given)', 'recording': '(must be given)', 'folder': "''"}
-# What rclpy declares by itself on every node.
+# What the page shows for the parameters that `_placeholders` sets.
+_SHOWN_FOR_PLACEHOLDER = {
+    'source': '(must be given)',
+    'recording': '(must be given)',
+    'folder': "''",
+}
+# Parameters that rclpy itself declares on every node.
 _NOT_OURS = ('use_sim_time', 'start_type_description_service')
 
 _TOPICS_HEAD = """# Topics and services
 
 Made by `./ja reference` from the code; do not edit. All names are relative (namespaces and remaps
-work) but `/clock` and `/diagnostics`. The stamp of an image goes unchanged through everything that
-follows from it. Every image gets one message on each topic of the loop, an empty one where there
-is nothing to say. Beside the graph, `recorder` hears every topic, `player` says again what was
-recorded, and `view` hears what it shows, while somebody looks.
+work) except `/clock` and `/diagnostics`. All messages that follow from an image carry its stamp
+unchanged. Every image gets one message on each topic of the loop, an empty one where there is no
+result. Beside the graph, `recorder` subscribes to every topic, `player` publishes what was
+recorded, and `view` subscribes to what it shows while the page is open.
 
-| topic | type | said by | heard by | quality of service (said / heard) | what it is |
+| topic | type | publishers | subscribers | QoS (publishers / subscribers) | what it is |
 |---|---|---|---|---|---|
 """
 _SERVICES_HEAD = """
@@ -74,7 +77,7 @@ value is refused with the reason and changes nothing; *fixed* parameters are rea
 
 
 def write_reference(folder: Path) -> list[Path]:
-    """Write the pages, and the SROS2 policy, into a folder; their paths."""
+    """Write the pages and the SROS2 policy into a folder; return their paths."""
     with every_node((*NODES, *COMPANIONS)) as nodes:
         pages = {
             'topics.md': topics_page(nodes),
@@ -91,12 +94,10 @@ def write_reference(folder: Path) -> list[Path]:
 def every_node(
     specs: Sequence[NodeSpec] = NODES, arguments: Sequence[str] = ()
 ) -> Iterator[list[GraphNode]]:
-    """One of each node, with further ROS arguments, in a private context, until the block ends."""
-    context = Context()
-    rclpy.init(args=[], context=context)
+    """Start one of each node, with further ROS arguments, in a private context for the block."""
     cli_args = ['--ros-args', *arguments] if arguments else []
-    with TemporaryDirectory() as folder:
-        overrides = _stand_ins(Path(folder))
+    with private_context() as context, TemporaryDirectory() as folder:
+        overrides = _placeholders(Path(folder))
         nodes: list[GraphNode] = []
         try:
             for spec in specs:
@@ -107,11 +108,10 @@ def every_node(
         finally:
             for node in nodes:
                 node.destroy_node()
-            context.try_shutdown()
 
 
-def _stand_ins(folder: Path) -> dict[str, list[Parameter]]:
-    """Something to show for the camera, something to play, and a place to record into."""
+def _placeholders(folder: Path) -> dict[str, list[Parameter]]:
+    """Make an image for the camera, a recording for the player, a folder for the recorder."""
     cv2.imwrite(str(folder / 'grey.png'), np.full((48, 64, 3), 128, np.uint8))
     recording = RecordingFolder(folder / 'played', Limits())
     clock = Channel(CLOCK.name, 'rosgraph_msgs/msg/Clock', offered_text([CLOCK.publisher_qos]))
@@ -125,19 +125,20 @@ def _stand_ins(folder: Path) -> dict[str, list[Parameter]]:
 
 
 def topics_page(nodes: list[GraphNode]) -> str:
-    """The table of topics and services, in Markdown."""
-    says, hears = defaultdict(list), defaultdict(list)
+    """Return the tables of topics and services, in Markdown."""
+    publishers, subscribers = defaultdict(list), defaultdict(list)
     services: dict[str, tuple[type, list[str]]] = {}
     for node in nodes:
         for topic in node.published_topics.values():
-            says[topic.name].append(node.get_name())
+            publishers[topic.name].append(node.get_name())
         for topic in node.subscribed_topics.values():
-            hears[topic.name].append(node.get_name())
+            subscribers[topic.name].append(node.get_name())
         for name, service in node.advertised_services.items():
             services.setdefault(name.lstrip('/'), (service, []))[1].append(node.get_name())
     rows = [
-        f'| `{topic.name}` | {_type_name(topic.type)} | {_names(says[topic.name], nodes)} '
-        f'| {_names(hears[topic.name], nodes)} | {_qos(topic.publisher_qos)} / {_qos(topic.subscriber_qos)} '
+        f'| `{topic.name}` | {_type_name(topic.type)} | {_names(publishers[topic.name], nodes)} '
+        f'| {_names(subscribers[topic.name], nodes)} '
+        f'| {_qos(topic.publisher_qos)} / {_qos(topic.subscriber_qos)} '
         f'| {topic.purpose} |\n'
         for topic in TOPICS
     ]
@@ -149,7 +150,7 @@ def topics_page(nodes: list[GraphNode]) -> str:
 
 
 def parameters_page(nodes: list[GraphNode]) -> str:
-    """The tables of parameters, one a node, in Markdown."""
+    """Return the tables of parameters, one for each node, in Markdown."""
     sections = []
     for node in nodes:
         head = f'\n## {node.get_name()}\n\n| parameter | default | range | what it is |\n'
@@ -182,8 +183,8 @@ def _qos(profile: QoSProfile) -> str:
 
 
 def _default(node: GraphNode, name: str) -> str:
-    if name in _STOOD_IN_FOR:
-        return _STOOD_IN_FOR[name]
+    if name in _SHOWN_FOR_PLACEHOLDER:
+        return _SHOWN_FOR_PLACEHOLDER[name]
     value = node.get_parameter(name).value
     return repr(round(value, 6)) if isinstance(value, float) else repr(value)
 

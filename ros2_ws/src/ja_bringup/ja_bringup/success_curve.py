@@ -1,4 +1,4 @@
-"""What a run leaves behind: the success curve as CSV and as a picture."""
+"""The success curve of a run, as CSV and as a picture."""
 
 import csv
 from dataclasses import asdict, fields
@@ -16,7 +16,7 @@ PNG_NAME = 'success_curve.png'
 
 
 def write_csv(curve: LearningCurve, folder: Path) -> Path:
-    """One row a trial."""
+    """Write one row for each trial; return the path."""
     path = folder / CSV_NAME
     with path.open('w', newline='') as file:
         writer = csv.DictWriter(file, [field.name for field in fields(TrialRecord)])
@@ -26,7 +26,7 @@ def write_csv(curve: LearningCurve, folder: Path) -> Path:
 
 
 def draw_png(curve: LearningCurve, folder: Path, window: int) -> Path:
-    """Success rate of the recent trials and p(LM), over trials (as Figure 6 of the paper)."""
+    """Plot the recent success rate and p(LM) over trials (as Figure 6 of the paper)."""
     path = folder / PNG_NAME
     trials = [record.trial for record in curve.records]
     practice = [record.stage == 'practice' for record in curve.records]
@@ -48,7 +48,7 @@ def _draw_exams(axes: Axes, curve: LearningCurve) -> None:
     label = 'learner alone (95 % interval)'
     for stage in dict.fromkeys(r.stage for r in curve.records if r.stage.startswith('exam')):
         rate = curve.rate(stage=stage)
-        trials = [record.trial for record in curve.of_stage(stage)]
+        trials = [record.trial for record in curve.trials_of_stage(stage)]
         errors = np.abs(np.subtract(rate.interval, rate.rate))[:, np.newaxis]
         axes.errorbar(np.mean(trials), rate.rate, errors, fmt='o', color='C1', label=label)
         label = '_again'

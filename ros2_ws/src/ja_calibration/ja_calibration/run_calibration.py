@@ -7,7 +7,7 @@ from typing import Any
 from ja_calibration.calibration_file import as_dict
 from ja_calibration.calibration_node import CalibrationNode
 from ja_common.executor import CachedWaitSetExecutor
-from ja_common.private_executor import own_executor
+from ja_common.private_context import private_executor
 
 _BRAKING_S = 3.0
 
@@ -21,7 +21,7 @@ def run_calibration(
     images allow no calibration, and KeyboardInterrupt once the head stands still.
     """
     # Ctrl-C must not end the context: the head has to brake first.
-    with own_executor(arguments) as executor:
+    with private_executor(arguments) as executor:
         node = CalibrationNode(context=executor.context)
         executor.add_node(node)
         try:

@@ -1,1 +1,1 @@
-"""What several packages of Joint Attention on ROS 2 need: the wire, and the geometry behind it."""
+"""What several packages need: geometry, statistics, configuration, topics, codecs, base node."""

@@ -15,7 +15,7 @@ _AS_THEY_ARE = [f for f in FIELDS if f not in ('z', 'kind', 'track_id', 'attende
 
 
 def encode_detections(header: Header, detections: list[Detection]) -> PointCloud2:
-    """One message for one image; `header` is the image's own, unchanged."""
+    """Return one message for one image; `header` is the image's own, unchanged."""
     return encode_columns(
         header,
         {f: [1.0 if f == 'z' else getattr(d, f) for d in detections] for f in FIELDS},
@@ -23,7 +23,7 @@ def encode_detections(header: Header, detections: list[Detection]) -> PointCloud
 
 
 def decode_detections(message: PointCloud2) -> list[Detection]:
-    """Detections of a message.
+    """Return the detections of a message.
 
     Raises ValueError when a field is missing, a number is not finite, or the kind is unknown.
     """

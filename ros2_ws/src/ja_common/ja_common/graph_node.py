@@ -1,4 +1,4 @@
-"""The base of every node: hear, say, offer; parameters, health, a clean end."""
+"""The base of every node: topics, services, parameters, health, a clean end."""
 
 import sys
 import time
@@ -29,11 +29,11 @@ Config = TypeVar('Config', bound=Configuration)
 
 
 class GraphNode(Node):
-    """A node that outlives bad input, reports its health at 1 Hz and says what it misses.
+    """A node that survives bad input, and reports its health and silent inputs at 1 Hz.
 
     Callbacks may raise ValueError with one clear sentence for input that cannot be used (or
-    OSError for a file): it is logged with the topic's name (news only), shown in /diagnostics, and
-    the node lives on.
+    OSError for a file): it is logged once with the topic's name, shown in /diagnostics, and the
+    node runs on.
     """
 
     def __init__(self, name: str, **node_kwargs: Any) -> None:
@@ -55,7 +55,7 @@ class GraphNode(Node):
         return declare_config(self, config_class, changed)
 
     def create_topic_publisher(self, topic: Topic) -> Publisher:
-        """A publisher of a topic."""
+        """Create a publisher of a topic."""
         publisher = self.create_publisher(
             topic.type,
             topic.name,
@@ -78,11 +78,11 @@ class GraphNode(Node):
             try:
                 callback(message)
             except (ValueError, OSError) as error:
-                self.problem(resolved, f'{resolved}: {error}')
+                self.report_problem(resolved, f'{resolved}: {error}')
             except Exception as error:
-                # Not input but a fault of ours: the node lives on, and the trace is kept.
+                # No bad input but a bug: the node runs on, and the trace is logged.
                 text = f'{resolved}: {type(error).__name__}: {error}\n{traceback.format_exc()}'
-                self.problem(resolved, text)
+                self.report_problem(resolved, text)
 
         # Default event callbacks cost a third of the throughput; `_why_silent` explains instead.
         subscription = self.create_subscription(
@@ -94,12 +94,12 @@ class GraphNode(Node):
         )
         resolved = subscription.topic_name
         self.subscribed_topics[resolved] = topic
-        self.health.expect(resolved, expected_every_s)
+        self.health.watch_input(resolved, expected_every_s)
 
     def advertise_service(
         self, service_type: Any, name: str, callback: Callable[[Any, Any], Any]
     ) -> None:
-        """A service; an error of the callback is answered as `success = False` with its text."""
+        """Offer a service; an error of the callback becomes `success = False` with its text."""
 
         def guarded(request: Any, response: Any) -> Any:
             try:
@@ -108,20 +108,20 @@ class GraphNode(Node):
                 text = str(error)
             except Exception as error:
                 text = f'{type(error).__name__}: {error}'
-                self.problem(name, f'{name}: {text}\n{traceback.format_exc()}')
+                self.report_problem(name, f'{name}: {text}\n{traceback.format_exc()}')
             response.success, response.message = False, text
             return response
 
         service = self.create_service(service_type, name, guarded)
         self.advertised_services[service.srv_name] = service_type
 
-    def folder_of_its_own(self, folder: str | Path) -> Path:
-        """Where in a folder this node's files go: heads side by side differ by namespaces."""
+    def namespaced_folder(self, folder: str | Path) -> Path:
+        """Return the subfolder for the files of this node's namespace: one for each head."""
         return Path(folder).expanduser() / self.get_namespace().strip('/')
 
-    def problem(self, where: str, message: str, level: Level = Level.ERROR) -> None:
-        """Something is wrong: into /diagnostics, and into the log when it is news."""
-        if self.health.problem(where, message, time.monotonic(), level):
+    def report_problem(self, where: str, message: str, level: Level = Level.ERROR) -> None:
+        """Show a problem in /diagnostics, and log it when it is news."""
+        if self.health.record_problem(where, message, time.monotonic(), level):
             log = self.get_logger()
             if level >= Level.ERROR:
                 log.error(message)
@@ -130,15 +130,15 @@ class GraphNode(Node):
 
     def _report(self) -> None:
         if halted_s := self._discovery_refresher.refresh(time.monotonic()):
-            self.problem('halt', f'this node stood still for {halted_s:.1f} s', Level.WARN)
-        silent = self.health.silent(time.monotonic())
+            self.report_problem('halt', f'this node stood still for {halted_s:.1f} s', Level.WARN)
+        silent = self.health.silent_inputs(time.monotonic())
         for name in self.subscribed_topics:
             where = f'silence of {name}'
             if name in silent:
                 text = f'no message on {name} for more than {silent[name]:g} s: '
-                self.problem(where, text + self._why_silent(name), Level.WARN)
+                self.report_problem(where, text + self._why_silent(name), Level.WARN)
             else:
-                self.health.resolved(where)
+                self.health.clear_problem(where)
         report = self.health.report(time.monotonic())
         status = DiagnosticStatus(
             level=bytes([report.level]),
@@ -154,29 +154,29 @@ class GraphNode(Node):
     def _why_silent(self, name: str) -> str:
         publishers = self.get_publishers_info_by_topic(name)
         if not publishers:
-            return 'nobody publishes it'
-        hears = self.subscribed_topics[name].subscriber_qos
+            return 'no node publishes it'
+        needed = self.subscribed_topics[name].subscriber_qos
         for publisher in publishers:
             offered = publisher.qos_profile
             if (
-                hears.reliability is ReliabilityPolicy.RELIABLE
+                needed.reliability is ReliabilityPolicy.RELIABLE
                 and offered.reliability is ReliabilityPolicy.BEST_EFFORT
             ) or (
-                hears.durability is DurabilityPolicy.TRANSIENT_LOCAL
+                needed.durability is DurabilityPolicy.TRANSIENT_LOCAL
                 and offered.durability is DurabilityPolicy.VOLATILE
             ):
                 return (
                     f'{publisher.node_name} publishes it with a quality of service that does not '
                     f'match: {offered.reliability.name} {offered.durability.name} is offered, '
-                    f'{hears.reliability.name} {hears.durability.name} is needed'
+                    f'{needed.reliability.name} {needed.durability.name} is needed'
                 )
-        return f'{publishers[0].node_name} is its publisher, but says nothing'
+        return f'{publishers[0].node_name} is its publisher, but sends nothing'
 
 
 def spin_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -> None:
-    """The `main` of every node: start, spin until asked to stop, end cleanly.
+    """Run a node as the `main` of its process, until SIGINT or SIGTERM.
 
-    Exits with code 2 and one sentence on a configuration that cannot be used.
+    Exits with code 2 and one sentence for a configuration that cannot be used.
     """
     apply_ros_defaults()
     node = None

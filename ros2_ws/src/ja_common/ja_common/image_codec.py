@@ -13,7 +13,7 @@ from ja_common.core.camera_model import CameraModel
 
 
 class ImageError(ValueError):
-    """An image message that cannot be turned into a picture; the text says why."""
+    """An image message that cannot be turned into a picture; the text has the reason."""
 
 
 _Decoder = Callable[[np.ndarray], np.ndarray]

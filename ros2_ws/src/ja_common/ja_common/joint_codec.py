@@ -1,4 +1,4 @@
-"""JointState on the wire: postures, changes of posture, and 'nothing to say' (no names)."""
+"""JointState on the wire: postures, changes of posture, and empty messages (no names)."""
 
 from dataclasses import dataclass
 
@@ -19,10 +19,10 @@ class JointConfig(Configuration):
     pan_inverted: bool = parameter(False, 'the rig counts pan to the right as positive')
     tilt_inverted: bool = parameter(False, 'the rig counts tilt upward as positive')
     pan_offset_rad: float = parameter(
-        0.0, "what the rig's pan joint says when the head looks ahead", low=-6.3, high=6.3
+        0.0, "what the rig's pan joint reads when the head looks ahead", low=-6.3, high=6.3
     )
     tilt_offset_rad: float = parameter(
-        0.0, "what the rig's tilt joint says when the head looks level", low=-6.3, high=6.3
+        0.0, "what the rig's tilt joint reads when the head looks level", low=-6.3, high=6.3
     )
 
 
@@ -30,7 +30,7 @@ class JointCodec:
     """Between (pan, tilt) in REP-103 axes and JointState in the rig's own names and signs.
 
     `encode` and `decode` are for changes and directions, `encode_posture` and `decode_posture` for
-    what the joints themselves say or are told: rig angle = sign * angle + offset.
+    measured and commanded joint angles: rig angle = sign * angle + offset.
     """
 
     def __init__(self, config: JointConfig) -> None:
@@ -43,7 +43,7 @@ class JointCodec:
     def encode(
         self, header: Header, angles: ArrayLike | None, velocity: ArrayLike | None = None
     ) -> JointState:
-        """Message for angles (2,) [rad] and velocity (2,) [rad/s]; no names when None."""
+        """Return a message for angles (2,) [rad], velocity (2,) [rad/s]; empty for angles None."""
         message = JointState(header=header)
         if angles is not None:
             message.name = self.names
@@ -53,7 +53,7 @@ class JointCodec:
         return message
 
     def decode(self, message: JointState) -> NDArray[np.float64] | None:
-        """Angles (2,) [rad], or None for an empty message.
+        """Return the angles (2,) [rad], or None for an empty message.
 
         Raises ValueError when a joint is not named, or the numbers are too few or not finite.
         """
@@ -64,18 +64,18 @@ class JointCodec:
     def encode_posture(
         self, header: Header, posture: ArrayLike, velocity: ArrayLike | None = None
     ) -> JointState:
-        """Message for what the joints are or shall be, (2,) [rad], [rad/s]."""
+        """Return a message for a measured or commanded posture (2,) [rad], [rad/s]."""
         message = self.encode(header, posture, velocity)
         message.position = (np.asarray(message.position) + self.offsets).tolist()
         return message
 
     def decode_posture(self, message: JointState) -> NDArray[np.float64] | None:
-        """What the joints are or shall be, (2,) [rad]; None and errors as for `decode`."""
+        """Return the measured or commanded posture (2,) [rad]; None and errors as `decode`."""
         angles = self.decode(message)
         return None if angles is None else angles - self.signs * self.offsets
 
     def decode_velocity(self, message: JointState) -> NDArray[np.float64] | None:
-        """Velocity (2,) [rad/s], or None where the message gives none.
+        """Return the velocity (2,) [rad/s], or None where the message gives none.
 
         joint_state_broadcaster of ros2_control sends NaN where the hardware measures none.
         """

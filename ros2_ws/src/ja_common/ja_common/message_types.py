@@ -1,4 +1,4 @@
-"""Message types by name, as a recorder meets them: the class, and the text of its definition."""
+"""Message types by name: the class, and the text of its definition."""
 
 import importlib
 import os
@@ -16,7 +16,7 @@ _FIELD = re.compile(r'^\s*(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?:\[[^\]]*\])?\s+\w
 
 
 def message_class(type_name: str) -> Any:
-    """The class of `package/msg/Name`. Raises ConfigError when it is not installed."""
+    """Return the class of `package/msg/Name`. Raises ConfigError when it is not installed."""
     package, _, name = type_name.partition('/msg/')
     try:
         return getattr(importlib.import_module(f'{package}.msg'), name)
@@ -26,7 +26,7 @@ def message_class(type_name: str) -> Any:
 
 @cache
 def schema_of(type_name: str) -> str:
-    """The definition of a type, followed by those of all types within it (encoding `ros2msg`).
+    """Return the definition of a type, then those of all types in it (encoding `ros2msg`).
 
     Raises ConfigError when a definition is not installed.
     """

@@ -29,7 +29,7 @@ _CHOICES = ' (one of '
 def declare_config(
     node: Node, config_class: type[Config], changed: Callable[[Config], None] | None = None
 ) -> Config:
-    """Declare every field of a configuration dataclass as a parameter; the values as one object.
+    """Declare every field of a configuration as a parameter; return the values as one object.
 
     With `changed` the parameters may be set while the node runs: a bad value is refused with the
     reason and changes nothing, a good one gives `changed` the new configuration. Without it they
@@ -55,7 +55,7 @@ def declare_config(
         ours = [p for p in parameters if p.name in config_fields]
         return replace(current, **{p.name: p.value for p in ours})  # type: ignore[type-var]
 
-    def judge(parameters: list[Parameter]) -> SetParametersResult:
+    def validate(parameters: list[Parameter]) -> SetParametersResult:
         try:
             updated(parameters)
         except (ConfigError, ValueError) as error:
@@ -68,13 +68,13 @@ def declare_config(
             current = updated(parameters)
             changed(current)
 
-    node.add_on_set_parameters_callback(judge)
+    node.add_on_set_parameters_callback(validate)
     node.add_post_set_parameters_callback(apply)
     return config
 
 
 def choices_of(descriptor: ParameterDescriptor) -> tuple[str, ...]:
-    """What a parameter declared by `declare_config` is chosen from; () when it is no choice."""
+    """Return the choices of a parameter that `declare_config` declared; () when it has none."""
     _, found, choices = descriptor.description.rpartition(_CHOICES)
     return tuple(choices.rstrip(')').split(', ')) if found else ()
 
@@ -85,7 +85,7 @@ def _descriptor(config_field: Any, read_only: bool) -> ParameterDescriptor:
     text = meta['description']
     if meta.get('choices'):
         text += f'{_CHOICES}{", ".join(meta["choices"])})'
-    # dynamic_typing lets `1` stand for `1.0`; the configuration then checks the type and the range.
+    # dynamic_typing lets `1` stand for `1.0`; the configuration then checks type and range.
     descriptor = ParameterDescriptor(
         name=config_field.name, description=text, dynamic_typing=True, read_only=read_only
     )

@@ -10,7 +10,7 @@ from std_msgs.msg import Header
 
 
 def encode_columns(header: Header, columns: Mapping[str, ArrayLike]) -> PointCloud2:
-    """A message whose points are the rows of the columns, each of shape (n,), as float32."""
+    """Return a message whose points are the rows of the columns, each (n,), as float32."""
     table = np.array([*columns.values()], '<f4').T
     return PointCloud2(
         header=header,
@@ -29,7 +29,7 @@ def encode_columns(header: Header, columns: Mapping[str, ArrayLike]) -> PointClo
 
 
 def decode_columns(message: PointCloud2, names: Sequence[str]) -> dict[str, NDArray[np.float32]]:
-    """Named columns, shape (n,), of a message, whatever the order of its fields.
+    """Return the named columns, each (n,), of a message with its fields in any order.
 
     Raises ValueError when a column is missing or not float32, or the data's size does not fit.
     """

@@ -15,7 +15,7 @@ _PLAY_DEPTH = 100
 
 
 def qos_entry(profile: QoSProfile) -> dict[str, Any]:
-    """One offered profile, in rosbag2's words."""
+    """Return one offered profile, in rosbag2's words."""
     return {
         'history': profile.history.name.lower(),
         'depth': profile.depth,
@@ -30,12 +30,12 @@ def qos_entry(profile: QoSProfile) -> dict[str, Any]:
 
 
 def offered_text(profiles: list[QoSProfile]) -> str:
-    """What a channel's metadata says under `offered_qos_profiles`."""
+    """Return the text of `offered_qos_profiles` in a channel's metadata."""
     return yaml.safe_dump([qos_entry(profile) for profile in profiles], sort_keys=False)
 
 
 def common_profile(reliable: bool, latched: bool, depth: int = _PLAY_DEPTH) -> QoSProfile:
-    """A profile with what matters when hearing or saying again."""
+    """Return a profile for subscribing to a recorded topic, or for publishing it again."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_LAST,
         depth=depth,
@@ -45,7 +45,7 @@ def common_profile(reliable: bool, latched: bool, depth: int = _PLAY_DEPTH) -> Q
 
 
 def profile_of(text: str) -> QoSProfile:
-    """How to say a recorded topic again: as reliably and as lastingly as it was said.
+    """Return the profile for playing a recorded topic, with its reliability and durability.
 
     Numbers, as rosbag2 wrote them before version 9, mean the same as the words.
     """

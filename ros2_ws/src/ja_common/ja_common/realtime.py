@@ -1,4 +1,4 @@
-"""Before all ordinary programs of the machine: for a process that must answer in time."""
+"""Real-time scheduling, for a process that must answer in time."""
 
 import contextlib
 import os
@@ -8,27 +8,27 @@ from pathlib import Path
 def enable_realtime_scheduling(priority: int) -> None:
     """Schedule all threads of this process, and those that they start, as real-time (SCHED_RR).
 
-    `priority`: 1-99. Raises OSError with one sentence where that is not to be had.
+    `priority`: 1-99. Raises OSError with one sentence where the system does not allow it.
     """
     if not hasattr(os, 'sched_setscheduler'):
-        raise OSError('real-time priority is not to be had on this system: as any program')
+        raise OSError('real-time priority is not available on this system: default priority')
     try:
         _schedule_all_threads(os.SCHED_RR, priority)
     except PermissionError:
         raise PermissionError(
             f'real-time priority {priority} is not allowed to this user: be root, or raise '
-            'rtprio in /etc/security/limits.conf; until then as any program'
+            'rtprio in /etc/security/limits.conf; until then default priority'
         ) from None
 
 
-def go_back_among_all() -> None:
-    """All threads of this process, after `enable_realtime_scheduling`."""
+def restore_scheduling() -> None:
+    """Schedule all threads by default again, after `enable_realtime_scheduling`."""
     if hasattr(os, 'sched_setscheduler'):
         _schedule_all_threads(os.SCHED_OTHER, 0)
 
 
 def use_default_scheduling() -> None:
-    """The calling thread alone, whatever the thread that started it is."""
+    """Schedule the calling thread by default, however its parent thread is scheduled."""
     if hasattr(os, 'sched_setscheduler'):
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 

@@ -3,11 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import rclpy
 import yaml
-from rclpy.context import Context
 
 from ja_common.core.config import ConfigError
+from ja_common.private_context import private_context
 from ja_common.rclpy_private import RCLError, UnknownROSArgsError
 
 
@@ -37,18 +36,13 @@ def split_ros_arguments(argv: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def check_ros_arguments(arguments: Sequence[str]) -> None:
-    """Raises ConfigError with one sentence for arguments that no node would understand."""
-    context = Context()
+    """Raise ConfigError with one sentence for arguments that no node would understand."""
     try:
-        rclpy.init(
-            args=['--ros-args', *arguments],
-            context=context,
-            signal_handler_options=rclpy.SignalHandlerOptions.NO,
-        )
+        with private_context(arguments):
+            pass
     except UnknownROSArgsError as error:
         raise ConfigError(f'unknown ROS arguments: {error}') from None
     except RCLError as error:
         # "failed to initialize rcl: WHAT, at FILE:LINE, at ..."
         what = str(error).removeprefix('failed to initialize rcl: ').split(', at ')[0]
         raise ConfigError(f'ROS arguments: {what}') from None
-    context.try_shutdown()

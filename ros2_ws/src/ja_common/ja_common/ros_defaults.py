@@ -7,7 +7,7 @@ from importlib.resources import files
 
 PROFILE = files('ja_common') / 'fastdds_profile.xml'
 LEASE_S = 2.0
-"""In the profile: a node that is not heard of for so long is taken for dead."""
+"""In the profile: after this silence [s] other nodes take a node for dead."""
 
 ENVIRONMENT = {
     'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',

@@ -1,8 +1,8 @@
-"""What a status says, by name."""
+"""The values of a DiagnosticStatus, by key."""
 
 from diagnostic_msgs.msg import DiagnosticStatus
 
 
 def status_values(status: DiagnosticStatus) -> dict[str, str]:
-    """The values of a status by their keys."""
+    """Return the values of a status by their keys."""
     return {pair.key: pair.value for pair in status.values}

@@ -184,7 +184,7 @@ class Synchroniser:
         for (call, found), posture in self._strict.pop_ready():
             if posture is None:
                 text = 'no joint state for the stamp of an image: skipped'
-                self._node.problem('posture', text)
+                self._node.report_problem('posture', text)
             else:
                 call(_with_posture(found, posture))
 

@@ -6,10 +6,10 @@ from ja_common.core.stamps import NS_PER_S
 
 
 def to_ns(time: Time) -> int:
-    """Nanoseconds of a message's stamp."""
+    """Return a message's stamp in nanoseconds."""
     return time.sec * NS_PER_S + time.nanosec
 
 
 def to_time(stamp_ns: int) -> Time:
-    """A message's stamp from nanoseconds."""
+    """Return a message's stamp for a time in nanoseconds."""
     return Time(sec=stamp_ns // NS_PER_S, nanosec=stamp_ns % NS_PER_S)

@@ -25,9 +25,9 @@ def _qos(reliable: bool, depth: int, latched: bool = False) -> QoSProfile:
     )
 
 
-@dataclass(frozen=True, eq=False)  # each is one of a kind, and may be a key
+@dataclass(frozen=True, eq=False)  # compared by identity, so that a topic can be a key
 class Topic:
-    """One topic: who says it speaks with `says`, who hears it listens with `hears`."""
+    """One topic: its publishers use `publisher_qos`, its subscribers `subscriber_qos`."""
 
     name: str
     type: Any
@@ -36,14 +36,14 @@ class Topic:
     subscriber_qos: QoSProfile
 
 
-# A sensor speaks reliably and is heard best-effort, so that any camera or rig driver matches.
-# Images are heard with depth 1: an old picture is worth nothing.
+# Sensors publish reliably, and we subscribe best-effort, so that any camera or rig driver matches.
+# Images have depth 1: an old picture is of no use.
 _PICTURE = {'publisher_qos': _qos(True, 1), 'subscriber_qos': _qos(False, 1)}
 # Joint states come several to an image, and interpolation wants them all.
 _SENSOR = {'publisher_qos': _qos(True, 50), 'subscriber_qos': _qos(False, 50)}
 # Between our own nodes nothing may be lost: one message an image, on every topic.
 _LINK = {'publisher_qos': _qos(True, 10), 'subscriber_qos': _qos(True, 10)}
-# For people and tools that come later and want the last word.
+# For people and tools that start later and want the last message.
 _LATCHED = {
     'publisher_qos': _qos(True, 1, latched=True),
     'subscriber_qos': _qos(True, 1, latched=True),
@@ -67,7 +67,10 @@ FACE_IMAGE = Topic(
     'face_image', Image, "the caregiver's face, 30 rows x 25 columns, while attended", **_LINK
 )
 IMAGE_ANNOTATED = Topic(
-    'image_annotated', Image, 'what the detector sees, drawn while somebody looks', **_PICTURE
+    'image_annotated',
+    Image,
+    'the picture with the detections drawn in; published while a subscriber exists',
+    **_PICTURE,
 )
 VF_DELTA = Topic(
     'visual_feedback/delta', JointState, 'change of posture towards the target (Eq. 2)', **_LINK
@@ -96,7 +99,7 @@ EVIDENCE = Topic(
 BELIEF = Topic(
     'learning_module/belief',
     PointCloud2,
-    'samples of where the learner believes she looks: pan, tilt, weight; while somebody looks',
+    'samples of where the learner believes she looks: pan, tilt, weight; while subscribed',
     **_LINK,
 )
 FIXATION = Topic(
@@ -106,18 +109,18 @@ FIXATION = Topic(
     **_LINK,
 )
 JOINT_COMMANDS = Topic(
-    'joint_commands', JointState, 'absolute posture the head shall take, limited', **_LINK
+    'joint_commands', JointState, 'absolute posture that the head takes next, limited', **_LINK
 )
 JOINT_TRAJECTORY = Topic(
     'joint_trajectory_controller/joint_trajectory',
     JointTrajectory,
-    'the same for a ros2_control joint_trajectory_controller, if so configured',
+    'the same for a ros2_control joint_trajectory_controller, where configured',
     **_LINK,
 )
 FORWARD_COMMANDS = Topic(
     'forward_position_controller/commands',
     Float64MultiArray,
-    'the same for a ros2_control forward_command_controller, if so configured',
+    'the same for a ros2_control forward_command_controller, where configured',
     **_LINK,
 )
 ROBOT_DESCRIPTION = Topic(

@@ -1,4 +1,4 @@
-"""`gate`: arbitrates between visual feedback and the learner, and alone commands the head."""
+"""`gate`: chooses between visual feedback and the learner; only it commands the head."""
 
 import time
 from dataclasses import dataclass, replace
@@ -45,7 +45,7 @@ from ja_control.core.trial_count import load_trials, save_trials
 from ja_control.core.urdf_limits import narrow_limits, read_joint
 
 _PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, GLANCE_DELTA, FIXATION)
-# Longer than any image takes; a clock that is set forward is no time in which the head turns.
+# Longer than any image takes: the head does not turn in the time of a clock set forward.
 _LONGEST_STEP_S = 2.0
 _STATUS_EVERY_S = 0.1
 
@@ -58,7 +58,7 @@ class GateConfig(Configuration):
     enabled_at_start: bool = parameter(True, 'move from the start, without a call of `enable`')
     lockstep: bool = parameter(
         False,
-        'time is that of the images: one command an image, and nothing is ever late '
+        'take the time from the images: one command an image, and no input is ever late '
         '(else: commands at control_rate_hz, whatever the camera does)',
     )
     control_rate_hz: float = parameter(
@@ -66,22 +66,22 @@ class GateConfig(Configuration):
     )
     limits_from: str = parameter(
         'parameters',
-        'where the joint limits come from; with a URDF the narrower of both hold, and none moves '
-        'before it has come',
+        'where the joint limits come from; with a URDF the narrower of both hold, and the head '
+        'is held until it has come',
         choices=('parameters', 'robot_description'),
     )
     trials_file: str = parameter(
         '',
-        'where the count of trials outlives a restart, in a folder there of its own for each '
-        'namespace; empty: nowhere',
+        'file that keeps the count of trials over a restart, in a folder of its own for each '
+        'namespace; empty: the count is not kept',
     )
 
 
 class GateNode(GraphNode):
-    """Takes one decision for every image on which all proposals have come, and has it obeyed.
+    """Takes one decision for every image with all its proposals, and commands the head by it.
 
-    In real time a steady timer steps the guard; commands carry the header of the image that they
-    follow, and the time of the clock while the head is held.
+    In real time a steady timer steps the guard. A command carries the header of the image that it
+    follows, or the time of the clock while the head is held.
     """
 
     def __init__(self, **node_kwargs: Any) -> None:
@@ -103,8 +103,8 @@ class GateNode(GraphNode):
             lambda target: self._guard.limits.reachable(target),
         )
         kept = Path(self._config.trials_file)
-        self._trials_file = self.folder_of_its_own(kept.parent) / kept.name
-        self._cycle.trials = self._kept_trials()
+        self._trials_file = self.namespaced_folder(kept.parent) / kept.name
+        self._cycle.trials = self._load_trials()
 
         self._header = Header()
         self._stamp_ns = 0
@@ -112,7 +112,7 @@ class GateNode(GraphNode):
         self._answer: JointState | None = None
         self._guard_hold: Hold | None = None
         self._hold: Hold | None = None
-        self._told_s = -np.inf
+        self._status_s = -np.inf
 
         self._synchroniser = Synchroniser(self, self._joints)
         deltas = dict.fromkeys(_PROPOSALS, self._joints.decode)
@@ -144,7 +144,7 @@ class GateNode(GraphNode):
     def _set_gating(self, config: GatingConfig) -> None:
         self._cycle.gating = Gating(config)
 
-    def _kept_trials(self) -> int:
+    def _load_trials(self) -> int:
         if not self._config.trials_file:
             return 0
         try:
@@ -166,17 +166,17 @@ class GateNode(GraphNode):
         )
 
     def _act(self, found: StampedSet) -> None:
-        """Everybody has judged an image."""
+        """Decide on an image with all its proposals, and command the head in lockstep."""
         posture = found.posture
         lockstep = self._config.lockstep
         step_s = (posture.stamp_ns - self._stamp_ns) / NS_PER_S
         if step_s == 0.0:
-            # The same image again (a sim that lost the answer): the same answer again.
+            # The same image again (the sim lost the answer): the same answer again.
             if lockstep and self._answer is not None:
                 self._output.publish(self._answer)
             return
         if -REORDERED_WITHIN_S < step_s < 0.0:
-            return  # late: a newer image has been answered already
+            return  # late: a newer image was answered already
         if step_s < 0.0:
             self._guard.restart()  # the clock was set back
         self._header, self._stamp_ns = found.header, posture.stamp_ns
@@ -210,7 +210,7 @@ class GateNode(GraphNode):
         return decision
 
     def _now_s(self) -> float:
-        # In lockstep time passes from image to image; on a rig it passes whatever comes.
+        # In lockstep time passes from image to image; on a rig it always passes.
         return self._stamp_ns / NS_PER_S if self._config.lockstep else time.monotonic()
 
     def _age_s(self, stamp_ns: int) -> float:
@@ -222,25 +222,25 @@ class GateNode(GraphNode):
         try:
             self._step(self._now_s(), self._synchroniser.newest_posture, 1)
         except ValueError as error:
-            self.problem('control', f'control: {error}')
+            self.report_problem('control', f'control: {error}')
 
     def _step(self, now_s: float, measured: Posture | None, periods: int) -> None:
         if measured is not None:
             self._guard.record_joints(measured.position, now_s, self._age_s(measured.stamp_ns))
         command = self._guard.step(now_s, periods)
-        news = self._note_hold(command.hold)
+        changed = self._update_hold(command.hold)
         if self._config.lockstep and command.position is None and measured is not None:
-            # The sim waits for an answer even of a gate that may not move.
+            # The sim waits for an answer even while the head is held.
             command = replace(command, position=measured.position)
         if command.position is not None:
-            self._publish(command)
-        due = self._config.lockstep or now_s - self._told_s >= _STATUS_EVERY_S
-        if news or due or self._decision is not None:
-            self._tell(command)
-            self._told_s = now_s
+            self._publish_command(command)
+        due = self._config.lockstep or now_s - self._status_s >= _STATUS_EVERY_S
+        if changed or due or self._decision is not None:
+            self._publish_status(command)
+            self._status_s = now_s
             self._decision = None
 
-    def _publish(self, command: Command) -> None:
+    def _publish_command(self, command: Command) -> None:
         assert command.position is not None
         header = self._header
         if command.hold is not None and not self._config.lockstep:
@@ -248,24 +248,24 @@ class GateNode(GraphNode):
         self._answer = self._joints.encode_posture(header, command.position, command.velocity)
         self._output.publish(self._answer)
 
-    def _note_hold(self, hold: Hold | None) -> bool:
-        """Keep why the head is held, with the topics that are missing; whether it is news."""
-        news, self._guard_hold = hold != self._guard_hold, hold
-        if news and hold is not None and hold.cause is Cause.SILENT:
+    def _update_hold(self, hold: Hold | None) -> bool:
+        """Keep why the head is held, with the missing topics; return whether this has changed."""
+        changed, self._guard_hold = hold != self._guard_hold, hold
+        if changed and hold is not None and hold.cause is Cause.SILENT:
             behind = self._synchroniser.waits_for_posture
             missing = (
                 [JOINT_STATES.name] if behind else sorted(self._synchroniser.missing_topics())
             )
             hold = Hold(hold.cause, f'{hold.text}; missing: {", ".join(missing)}')
-        if news:
+        if changed:
             self._hold = hold
         if self._hold is None:
-            self.health.resolved('hold')
+            self.health.clear_problem('hold')
         else:
-            self.problem('hold', f'holding the head: {self._hold.text}', self._hold.level)
-        return news
+            self.report_problem('hold', f'holding the head: {self._hold.text}', self._hold.level)
+        return changed
 
-    def _tell(self, command: Command) -> None:
+    def _publish_status(self, command: Command) -> None:
         hold, decision = self._hold, self._decision
         values = {
             'trials': str(self._cycle.trials),

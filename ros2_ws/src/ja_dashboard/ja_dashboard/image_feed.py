@@ -1,4 +1,4 @@
-"""What the robot sees and does image by image, heard while somebody looks and at our own pace."""
+"""Images with their detections, polled from the graph while the page has a viewer."""
 
 import math
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rclpy.node import Node
 from sensor_msgs.msg import CameraInfo, JointState, PointCloud2
 
-from ja_common.core.annotate import annotated
+from ja_common.core.annotate import annotate_image
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.detection import Detection
 from ja_common.core.fixation import WIDTH_SIXTH
@@ -37,18 +37,19 @@ from ja_common.topics import (
     VF_DELTA,
     Topic,
 )
-from ja_dashboard.core.view_model import Glance, TruthView, ViewModel
+from ja_dashboard.core.view_model import SceneView, TruthView, ViewModel
 
-ALL_OF_ONE_LOOK = 50
-"""So many messages may wait from look to look: all of 500 images a second, ten looks a second."""
+MESSAGES_PER_POLL = 50
+"""Messages kept from poll to poll: enough for 500 images and ten polls a second."""
 _DEPTHS = {
     **dict.fromkeys((IMAGE, CAMERA_INFO, BELIEF), 1),
     **dict.fromkeys(
-        (JOINT_STATES, DETECTIONS, FACE_IMAGE, VF_DELTA, LM_DELTA, JOINT_COMMANDS), ALL_OF_ONE_LOOK
+        (JOINT_STATES, DETECTIONS, FACE_IMAGE, VF_DELTA, LM_DELTA, JOINT_COMMANDS),
+        MESSAGES_PER_POLL,
     ),
 }
 _STEPS = (DETECTIONS, VF_DELTA, LM_DELTA, FIXATION, JOINT_COMMANDS)
-"""What follows from an image, in the order in which it is said."""
+"""The topics that follow from an image, in their order."""
 _ASSUMED_VIEW_RAD = math.radians(36)
 _JPEG_QUALITY = 80
 LIMITS = ('pan_min_rad', 'tilt_min_rad', 'pan_max_rad', 'tilt_max_rad')
@@ -57,7 +58,7 @@ LIMITS = ('pan_min_rad', 'tilt_min_rad', 'pan_max_rad', 'tilt_max_rad')
 
 @dataclass(frozen=True)
 class Picture:
-    """One image (H, W, 3) RGB with what was found in it."""
+    """One image (H, W, 3) RGB with its detections."""
 
     stamp_ns: int
     image: NDArray[np.uint8]
@@ -67,8 +68,8 @@ class Picture:
     latency_s: float
 
     def jpeg(self) -> bytes:
-        """With boxes, centre circle and face crop drawn in."""
-        drawn = annotated(
+        """Return the image as JPEG with boxes, centre circle and face crop."""
+        drawn = annotate_image(
             self.image, self.detections, self.face_image, self.camera, WIDTH_SIXTH, self.latency_s
         )
         quality = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
@@ -76,69 +77,74 @@ class Picture:
 
 
 class ImageFeed:
-    """Everything that comes once an image; exists only while somebody looks."""
+    """All topics that come once an image; exists only while the page has a viewer."""
 
     def __init__(self, node: Node, model: ViewModel, joints: JointCodec) -> None:
         self._node = node
         self._model = model
         self._joints = joints
-        self.boxes = {topic: PolledSubscription(node, topic, depth) for topic, depth in _DEPTHS.items()}
+        self.subscriptions = {
+            topic: PolledSubscription(node, topic, depth) for topic, depth in _DEPTHS.items()
+        }
         self._postures = PostureHistory()
         self._pending: tuple[int, Any] | None = None
         self._sent_ns: dict[int, int] = {}
         self._calibration: CameraInfo | None = None
         self.limits = np.radians([[-60.0, -35.0], [60.0, 35.0]])
         self.picture: Picture | None = None
-        self.glance: Glance | None = None
+        self.scene: SceneView | None = None
         self.latencies_ms: dict[str, float] = {}
 
     def close(self) -> None:
         """Stop listening."""
-        for box in self.boxes.values():
-            box.close()
-        self.boxes.clear()
+        for subscription in self.subscriptions.values():
+            subscription.close()
+        self.subscriptions.clear()
 
     def show_truth(self, shown: bool) -> None:
-        """Hear the truth of the simulation, or not: unasked, none but the scorer hears it."""
-        if shown and SIM_TRUTH not in self.boxes:
-            self.boxes[SIM_TRUTH] = PolledSubscription(self._node, SIM_TRUTH, 1)
-        elif not shown and SIM_TRUTH in self.boxes:
-            self.boxes.pop(SIM_TRUTH).close()
+        """Subscribe to the truth of the simulation, or stop; else only the scorer receives it."""
+        if shown and SIM_TRUTH not in self.subscriptions:
+            self.subscriptions[SIM_TRUTH] = PolledSubscription(self._node, SIM_TRUTH, 1)
+        elif not shown and SIM_TRUTH in self.subscriptions:
+            self.subscriptions.pop(SIM_TRUTH).close()
 
-    def look(self, now_s: float, fixations: list[tuple[JointState, int]]) -> None:
-        """Take what has come, and the fixations that were heard anyhow.
+    def poll_messages(self, now_s: float, fixations: list[tuple[JointState, int]]) -> None:
+        """Take the new messages; `fixations` come from the subscription of the node.
 
-        An image is shown once the detections on it are here.
+        An image is shown once its detections have come.
         """
-        taken = {topic: box.take_messages() for topic, box in self.boxes.items()} | {FIXATION: fixations}
+        taken = {
+            topic: subscription.take_messages()
+            for topic, subscription in self.subscriptions.items()
+        } | {FIXATION: fixations}
         for message, _ in taken[CAMERA_INFO]:
             self._calibration = message
         for message, _ in taken[JOINT_STATES]:
             if (posture := self._joints.decode_posture(message)) is not None:
                 self._postures.record_posture(to_ns(message.header.stamp), posture)
-        self._time(taken)
+        self._measure_latencies(taken)
         found = {to_ns(message.header.stamp): message for message, _ in taken[DETECTIONS]}
         faces = {to_ns(message.header.stamp): message for message, _ in taken[FACE_IMAGE]}
         if self._pending is not None and self._pending[0] in found:
             self._show(*self._pending, found, faces, taken)
         for message, _ in taken[IMAGE]:
             stamp_ns = to_ns(message.header.stamp)
-            self._model.hear_image(stamp_ns, now_s)
+            self._model.record_image(stamp_ns, now_s)
             self._pending = (stamp_ns, message)
             if stamp_ns in found:
                 self._show(stamp_ns, message, found, faces, taken)
 
-    def _time(self, taken: Mapping[Topic, list[tuple[Any, int]]]) -> None:
-        """How long after an image each node has said what follows from it."""
+    def _measure_latencies(self, taken: Mapping[Topic, list[tuple[Any, int]]]) -> None:
+        """Measure how long after an image each node published its result."""
         for message, sent_ns in taken[IMAGE]:
             self._sent_ns[to_ns(message.header.stamp)] = sent_ns
         while len(self._sent_ns) > 3:
             self._sent_ns.pop(next(iter(self._sent_ns)))
         for topic in _STEPS:
             for message, sent_ns in taken[topic]:
-                began_ns = self._sent_ns.get(to_ns(message.header.stamp))
-                if began_ns is not None:
-                    self.latencies_ms[topic.name] = (sent_ns - began_ns) / 1e6
+                image_ns = self._sent_ns.get(to_ns(message.header.stamp))
+                if image_ns is not None:
+                    self.latencies_ms[topic.name] = (sent_ns - image_ns) / 1e6
 
     def _show(
         self,
@@ -158,7 +164,7 @@ class ImageFeed:
         sample = self._postures.at(stamp_ns) or self._postures.newest
         posture = None if sample is None else sample.position
         rays = np.array([detection.ray for detection in detections]).reshape(-1, 2)
-        self.glance = Glance(
+        self.scene = SceneView(
             half_view=(
                 math.atan(camera.width / 2 / camera.fx), math.atan(camera.height / 2 / camera.fy)
             ),
@@ -175,13 +181,13 @@ class ImageFeed:
     def _newest_command(self, taken: list[tuple[JointState, int]]) -> NDArray[np.float64] | None:
         if taken:
             return self._joints.decode_posture(taken[-1][0])
-        return self.glance.command if self.glance else None
+        return self.scene.command if self.scene else None
 
     def _belief(self, taken: list[tuple[PointCloud2, int]]) -> NDArray[np.float64]:
         if taken:
             columns = decode_columns(taken[-1][0], ('pan', 'tilt', 'weight'))
             return np.column_stack(list(columns.values())).astype(float)
-        return self.glance.belief if self.glance else np.zeros((0, 3))
+        return self.scene.belief if self.scene else np.zeros((0, 3))
 
     def _truth(self, taken: list[tuple[PointCloud2, int]]) -> TruthView | None:
         if taken:
@@ -192,7 +198,7 @@ class ImageFeed:
                 np.column_stack([c['pan'], c['tilt']]).astype(float),
                 int(attended[0]) if len(attended) else -1,
             )
-        return self.glance.truth if self.glance and SIM_TRUTH in self.boxes else None
+        return self.scene.truth if self.scene and SIM_TRUTH in self.subscriptions else None
 
     def _camera(self, image: NDArray[np.uint8]) -> CameraModel:
         height, width = image.shape[:2]

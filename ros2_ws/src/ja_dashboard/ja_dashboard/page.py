@@ -1,4 +1,4 @@
-"""What the page looks like. It knows a robot's `frame` and its orders, and nothing of ROS."""
+"""The elements of the live page, without ROS: it reads frames and passes requests on."""
 
 from collections.abc import Sequence
 from html import escape
@@ -8,12 +8,12 @@ from nicegui import ui
 
 from ja_common.core.health import Level
 from ja_dashboard.core import drawings
-from ja_dashboard.core.view_model import CurvePoints, Light, RunState
+from ja_dashboard.core.view_model import CurvePoints, NodeHealth, RunState
 
 PICTURE_URL = '/picture.jpg'
 _PICTURE_EVERY_S = 0.1
-_REST_EVERY_S = 0.25
-_SPEEDS = {0.0: 'as fast as it can', 0.25: '¼ x', 0.5: '½ x', 1.0: '1 x', 2.0: '2 x', 5.0: '5 x'}
+_OTHERS_EVERY_S = 0.25
+_SPEEDS = {0.0: 'as fast as possible', 0.25: '¼ x', 0.5: '½ x', 1.0: '1 x', 2.0: '2 x', 5.0: '5 x'}
 _COLOURS = {
     RunState.WAITING: 'grey',
     RunState.RUNNING: 'green',
@@ -21,7 +21,7 @@ _COLOURS = {
     RunState.HELD: 'orange',
     RunState.STOPPED: 'red',
 }
-_LIGHT_COLOURS = {
+_LEVEL_COLOURS = {
     Level.OK: '#22c55e', Level.WARN: '#f59e0b', Level.ERROR: '#ef4444', Level.STALE: '#64748b',
 }  # fmt: skip
 _STYLE = """
@@ -43,53 +43,53 @@ body { background: #0f172a }
 
 
 class PageModel(Protocol):
-    """Who is shown: see `ViewNode`, which is one."""
+    """What the page needs of a `ViewNode`: frames to show, and requests to pass on."""
 
     @property
     def frame(self) -> Any: ...
-    def watched(self) -> None: ...
+    def note_viewer(self) -> None: ...
     def show_truth(self, shown: bool) -> None: ...
-    def switch(self, service: str, on: bool) -> None: ...
-    def trigger(self, service: str) -> None: ...
-    def set(self, name: str, value: Any) -> None: ...
+    def call_switch(self, service: str, on: bool) -> None: ...
+    def call_trigger(self, service: str) -> None: ...
+    def set_remote_parameter(self, name: str, value: Any) -> None: ...
 
 
 class Page:
     """Makes the page for every browser that opens it."""
 
-    def __init__(self, robot: PageModel) -> None:
-        self._robot = robot
+    def __init__(self, model: PageModel) -> None:
+        self._model = model
 
     def build(self) -> None:
-        """Called once a browser."""
-        _OpenPage(self._robot)
+        """Build the page for one browser."""
+        _OpenPage(self._model)
 
 
 class _OpenPage:
     """One open page."""
 
-    def __init__(self, robot: PageModel) -> None:
-        self._robot = robot
+    def __init__(self, model: PageModel) -> None:
+        self._model = model
         self._shown_log = 0
         self._shown_stamp = 0
         self._curve: CurvePoints | None = None
-        # What the robot last said of its switches and settings; true while we repeat it.
-        self._said: dict[str, Any] = {}
+        # The last known state of the switches and settings; `_mirroring` while the page shows it.
+        self._mirrored: dict[str, Any] = {}
         self._mirroring = False
         ui.add_css(_STYLE)
         with ui.row().classes('w-full items-center gap-2'):
             ui.label('Joint attention').classes('text-lg font-medium')
             self._badge = ui.badge('').mark('state').classes('text-sm px-2 py-1')
             self._why = ui.label().mark('why').classes('ja-quiet text-sm')
-        self._orders()
+        self._add_controls()
         with ui.element('div').classes('ja-page'):
             with self._card('What it sees'):
                 self._picture = ui.interactive_image().classes('w-full')
             with self._card('The scene from above'):
                 self._scene = ui.html(sanitize=False).classes('w-full')
                 ui.label(
-                    'Orange: objects seen. Yellow: her face. Violet: belief of the learner. '
-                    'Green: the truth. A camera tells directions; the distance is made up.'
+                    'Orange: detected objects. Yellow: her face. Violet: belief of the learner. '
+                    'Green: the truth. A camera measures directions; the distance is arbitrary.'
                 ).classes('ja-quiet text-xs')
             with self._card('Pan and tilt within their limits'):
                 self._postures = ui.html(sanitize=False).classes('w-full')
@@ -105,8 +105,8 @@ class _OpenPage:
                 self._log = ui.log(max_lines=200).classes('ja-log w-full text-xs')
                 self._log.style('height: 220px')
         ui.timer(_PICTURE_EVERY_S, self._show_picture)
-        ui.timer(_REST_EVERY_S, self._show_rest)
-        self._show_rest()
+        ui.timer(_OTHERS_EVERY_S, self._show_others)
+        self._show_others()
 
     @staticmethod
     def _card(title: str) -> ui.element:
@@ -115,8 +115,8 @@ class _OpenPage:
             ui.element('h2').props(f'innerHTML="{escape(title)}"')
         return card
 
-    def _orders(self) -> None:
-        robot = self._robot
+    def _add_controls(self) -> None:
+        model = self._model
         with ui.row().classes('w-full items-center gap-2 mb-2') as row:
             self._switches = {
                 'sim/pause': self._switch('pause', 'sim/pause'),
@@ -138,59 +138,61 @@ class _OpenPage:
                 ),
                 'learner': self._select('learner', 'learner', {}),
             }
-            self._truth = ui.switch('the truth', on_change=lambda e: robot.show_truth(e.value))
+            self._truth = ui.switch('the truth', on_change=lambda e: model.show_truth(e.value))
         row.style('row-gap: 4px')
 
     def _switch(self, text: str, service: str) -> ui.switch:
-        def turned(on: bool) -> None:
+        def set_switch(on: bool) -> None:
             if not self._mirroring:
-                self._robot.switch(service, on)
+                self._model.call_switch(service, on)
 
-        return ui.switch(text, on_change=lambda e: turned(e.value)).mark(service)
+        return ui.switch(text, on_change=lambda e: set_switch(e.value)).mark(service)
 
     def _button(self, text: str, service: str) -> ui.button:
-        button = ui.button(text, on_click=lambda: self._robot.trigger(service))
+        button = ui.button(text, on_click=lambda: self._model.call_trigger(service))
         return button.props('outline dense no-caps').mark(service)
 
     def _select(self, label: str, name: str, options: dict[Any, str]) -> ui.select:
-        def chosen(value: Any) -> None:
+        def set_value(value: Any) -> None:
             if not self._mirroring:
-                self._robot.set(name, value)
+                self._model.set_remote_parameter(name, value)
 
-        select = ui.select(options, label=label, on_change=lambda e: chosen(e.value)).mark(name)
+        select = ui.select(options, label=label, on_change=lambda e: set_value(e.value)).mark(name)
         return select.props('dense options-dense').classes('min-w-28')
 
     async def _ask_to_reset(self) -> None:
         with ui.dialog() as dialog, ui.card():
-            ui.label('Everything that was learned will be forgotten.')
+            ui.label('The learner will start from initial weights.')
             with ui.row():
-                ui.button('forget it', on_click=lambda: dialog.submit(True)).props('color=red')
-                ui.button('keep it', on_click=lambda: dialog.submit(False))
+                ui.button('forget everything', on_click=lambda: dialog.submit(True)).props(
+                    'color=red'
+                )
+                ui.button('keep everything', on_click=lambda: dialog.submit(False))
         if await dialog:
-            self._robot.trigger('reset_learning')
+            self._model.call_trigger('reset_learning')
         dialog.delete()
 
     def _show_picture(self) -> None:
-        """The browser asks for the next picture when it has loaded the last one."""
-        self._robot.watched()
-        picture = self._robot.frame.picture
+        """Set the address of the newest picture; the browser loads it after the last one."""
+        self._model.note_viewer()
+        picture = self._model.frame.picture
         if picture is not None and picture.stamp_ns != self._shown_stamp:
             self._shown_stamp = picture.stamp_ns
             self._picture.set_source(f'{PICTURE_URL}?{picture.stamp_ns}')
 
-    def _show_rest(self) -> None:
-        frame = self._robot.frame
+    def _show_others(self) -> None:
+        frame = self._model.frame
         self._badge.set_text(frame.state.run.value)
         self._badge.props(f'color={_COLOURS[frame.state.run]}')
         self._why.set_text(frame.state.text)
         for shown in (self._picture, self._scene, self._postures):
             old = not (frame.state.is_live or frame.state.run is RunState.PAUSED)
             shown.classes(add='ja-old' if old else '', remove='' if old else 'ja-old')
-        if frame.glance is not None:
-            self._scene.set_content(drawings.from_above(frame.glance))
-            self._postures.set_content(drawings.postures(frame.glance))
+        if frame.scene is not None:
+            self._scene.set_content(drawings.from_above(frame.scene))
+            self._postures.set_content(drawings.postures(frame.scene))
         self._facts.set_content(facts_html(frame.facts))
-        self._nodes.set_content(nodes_html(frame.lights, frame.latencies_ms))
+        self._nodes.set_content(nodes_html(frame.node_health, frame.latencies_ms))
         for name, element in {**self._buttons, **self._switches}.items():
             element.set_visibility(name in frame.services)
         self._truth.set_visibility('sim/step' in frame.services)
@@ -208,11 +210,11 @@ class _OpenPage:
                 self._log.push(line)
 
     def _mirror(self, elements: dict[str, Any], values: dict[str, Any]) -> None:
-        """Repeat what the robot says when it is news; what somebody just chose is left alone."""
+        """Show values that have changed; a value that the viewer just chose stays."""
         self._mirroring = True
         for name, value in values.items():
-            if name not in self._said or self._said[name] != value:
-                self._said[name] = value
+            if name not in self._mirrored or self._mirrored[name] != value:
+                self._mirrored[name] = value
                 element = elements[name]
                 if isinstance(element, ui.select) and value not in element.options:
                     element.set_options({**dict(element.options), value: str(value)})
@@ -221,35 +223,39 @@ class _OpenPage:
 
 
 def facts_html(facts: dict[str, str]) -> str:
-    """Names and values in two columns."""
+    """Return names and values in two columns."""
     rows = ''.join(f'<dt>{escape(k)}</dt><dd>{escape(v)}</dd>' for k, v in facts.items())
     return f'<dl class="ja-facts">{rows}</dl>'
 
 
-def nodes_html(lights: Sequence[Light], latencies_ms: dict[str, float]) -> str:
-    """A light for each node, what it says of itself, and its rates; then the way of an image."""
+def nodes_html(node_health: Sequence[NodeHealth], latencies_ms: dict[str, float]) -> str:
+    """Return the level, message and rates of each node, then the latencies of the last image."""
     rows = []
-    for light in lights:
-        colour = _LIGHT_COLOURS[light.level]
+    for health in node_health:
+        colour = _LEVEL_COLOURS[health.level]
         rates = [
             f'{key.removesuffix(" rate [1/s]")} {value}/s'
-            for key, value in light.values.items()
+            for key, value in health.values.items()
             if key.endswith(' rate [1/s]')
         ]
         others = [
             f'{key} {value}'
-            for key, value in light.values.items()
+            for key, value in health.values.items()
             if not key.endswith((' rate [1/s]', ' received'))
         ]
-        told = '<br>'.join(escape(text) for text in ([light.message] if light.level else []))
+        message = escape(health.message) if health.level else ''
         figures = escape(', '.join([*others, *rates]))
         rows.append(
             f'<tr><td><span class="ja-light" style="background:{colour}" '
-            f'title="{light.level.name}"></span></td><td>{escape(light.node.lstrip("/"))}'
-            f'<div>{told}</div><div class="ja-quiet">{figures}</div></td></tr>'
+            f'title="{health.level.name}"></span></td><td>{escape(health.node.lstrip("/"))}'
+            f'<div>{message}</div><div class="ja-quiet">{figures}</div></td></tr>'
         )
-    way = ', '.join(f'{name} {ms:.1f} ms' for name, ms in latencies_ms.items())
-    after = f'<div class="ja-quiet text-xs">after an image: {escape(way)}</div>' if way else ''
+    latencies = ', '.join(f'{name} {ms:.1f} ms' for name, ms in latencies_ms.items())
+    after = (
+        f'<div class="ja-quiet text-xs">after an image: {escape(latencies)}</div>'
+        if latencies
+        else ''
+    )
     return f'<table class="ja-nodes">{"".join(rows)}</table>{after}'
 
 

@@ -1,4 +1,4 @@
-"""Serves the page from a thread of its own; it ends with the process."""
+"""The web server of the live page, in its own thread; it ends with the process."""
 
 import asyncio
 import socket
@@ -16,16 +16,16 @@ _PORTS = 50
 
 
 class Server(threading.Thread):
-    """Web server of the live page, as a context manager; `address` is what to open."""
+    """Web server of the live page, as a context manager; open `address` in a browser."""
 
-    def __init__(self, robot: PageModel, host: str, port: int) -> None:
+    def __init__(self, model: PageModel, host: str, port: int) -> None:
         """Take the port, or the next one that is free. Raises ConfigError when none is."""
         super().__init__(name='web server', daemon=True)
         self._socket = _listen(host, port)
         shown = '127.0.0.1' if host == '0.0.0.0' else host
         self.address = f'http://{shown}:{self._socket.getsockname()[1]}'
         self._server = uvicorn.Server(
-            uvicorn.Config(web_app(robot), log_level='warning', timeout_graceful_shutdown=_GRACE_S)
+            uvicorn.Config(web_app(model), log_level='warning', timeout_graceful_shutdown=_GRACE_S)
         )
 
     def __enter__(self) -> 'Server':
@@ -40,24 +40,24 @@ class Server(threading.Thread):
         self.join(2 * _GRACE_S)
 
 
-def web_app(robot: PageModel) -> FastAPI:
-    """The page of a robot, and its picture."""
-    app = picture_app(robot)
-    ui.run_with(app, root=Page(robot).build, title='Joint attention', dark=True)
+def web_app(model: PageModel) -> FastAPI:
+    """Return an app that serves the page and its picture."""
+    app = picture_app(model)
+    ui.run_with(app, root=Page(model).build, title='Joint attention', dark=True)
     return app
 
 
-def picture_app(robot: PageModel) -> FastAPI:
-    """The newest picture as JPEG, drawn when it is asked for: the browser sets the pace.
+def picture_app(model: PageModel) -> FastAPI:
+    """Return an app that serves the newest picture as JPEG, drawn on request.
 
-    Who asks for it watches the robot.
+    Each request also notes a viewer.
     """
     app = FastAPI()
 
     @app.get(PICTURE_URL)
     def picture() -> Response:
-        robot.watched()
-        shown = robot.frame.picture
+        model.note_viewer()
+        shown = model.frame.picture
         if shown is None:
             return Response(status_code=404)
         headers = {'Cache-Control': 'no-store'}

@@ -1,4 +1,4 @@
-"""`view`: a live page for people. It only listens, calls services and sets parameters."""
+"""`view`: the live page. It only subscribes, calls services and sets parameters."""
 
 import math
 import os
@@ -29,13 +29,13 @@ from ja_common.parameters import choices_of
 from ja_common.polled_subscription import PolledSubscription
 from ja_common.status_values import status_values
 from ja_common.topics import DIAGNOSTICS, EVERY_SCORE, FIXATION, GATE_STATUS, LOG, Topic
-from ja_dashboard.core.view_model import CurvePoints, Glance, Light, State, ViewModel
-from ja_dashboard.image_feed import ALL_OF_ONE_LOOK, LIMITS, ImageFeed, Picture
+from ja_dashboard.core.view_model import CurvePoints, NodeHealth, SceneView, State, ViewModel
+from ja_dashboard.image_feed import LIMITS, MESSAGES_PER_POLL, ImageFeed, Picture
 
-LOOK_EVERY_S = 0.1
+POLL_EVERY_S = 0.1
 _ASK_EVERY_S = 2.0
-_WATCHED_FOR_S = 3.0
-_NICENESS = 10  # where the processor is scarce, the graph comes first
+_VIEWER_STAYS_S = 3.0
+_NICENESS = 10  # on a busy processor the graph comes first
 _SWITCHES = ('enable', 'sim/pause')
 _TRIGGERS = (
     'home', 'save_checkpoint', 'reset_learning', 'sim/step', 'sim/rearrange',
@@ -45,14 +45,16 @@ _SETTINGS = {
     'real_time_factor': 'sim',
     'objects': 'sim',
 }
-"""Parameters that the page sets, and whose they are."""
+"""Parameters that the page sets, and the node of each."""
 
 
 @dataclass(frozen=True)
 class ViewConfig(Configuration):
     """Where the page is served."""
 
-    host: str = parameter('127.0.0.1', 'address of the page; 0.0.0.0 serves it to everybody')
+    host: str = parameter(
+        '127.0.0.1', 'address of the page; 0.0.0.0 serves it to every machine on the network'
+    )
     port: int = parameter(
         8080, 'port of the page; the next one that is free if it is taken', low=1, high=65535
     )
@@ -60,11 +62,11 @@ class ViewConfig(Configuration):
 
 @dataclass(frozen=True)
 class Frame:
-    """All that the page shows at one moment; never changed, so that any thread may read it."""
+    """All that the page shows at one moment; immutable, so that any thread may read it."""
 
     state: State
     facts: dict[str, str]
-    lights: list[Light]
+    node_health: list[NodeHealth]
     latencies_ms: dict[str, float]
     curve: CurvePoints
     log: list[tuple[int, str]]
@@ -72,15 +74,15 @@ class Frame:
     choices: dict[str, tuple[str, ...]]
     services: frozenset[str]
     switches: dict[str, bool]
-    glance: Glance | None = None
+    scene: SceneView | None = None
     picture: Picture | None = None
 
 
 class ViewNode(GraphNode):
-    """Gathers a `frame` for the page ten times a second, and does what its buttons say.
+    """Makes a `frame` for the page ten times a second, and carries out its requests.
 
-    Everything that comes once an image is heard only while somebody watches. The public methods
-    may be called from another thread; what they ask for is done by the executor's.
+    It subscribes to the topics of images only while the page has a viewer. The public methods may
+    be called from another thread; the thread of the executor carries their requests out.
     """
 
     def __init__(self, **node_kwargs: Any) -> None:
@@ -88,9 +90,9 @@ class ViewNode(GraphNode):
         self.config = self.configure(ViewConfig)
         self._joints = JointCodec(self.configure(JointConfig))
         self._model = ViewModel(time.monotonic())
-        self._sight: ImageFeed | None = None
-        self._orders: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
-        self._watched_s = -math.inf
+        self._feed: ImageFeed | None = None
+        self._requests: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._viewer_s = -math.inf
         self._truth_shown = False
         self._limits: np.ndarray | None = None
         self._settings: dict[str, Any] = {}
@@ -100,160 +102,162 @@ class ViewNode(GraphNode):
         }
         self._switches = {name: self.create_client(SetBool, name) for name in _SWITCHES}
         self._triggers = {name: self.create_client(Trigger, name) for name in _TRIGGERS}
-        self._fixations = PolledSubscription(self, FIXATION, ALL_OF_ONE_LOOK)
-        self._statuses = PolledSubscription(self, GATE_STATUS, ALL_OF_ONE_LOOK)
+        self._fixations = PolledSubscription(self, FIXATION, MESSAGES_PER_POLL)
+        self._statuses = PolledSubscription(self, GATE_STATUS, MESSAGES_PER_POLL)
         self.subscribe(EVERY_SCORE, self._on_score)
         self.subscribe(DIAGNOSTICS, self._on_diagnostics)
         self.subscribe(LOG, self._on_log)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(LOOK_EVERY_S, self._look, clock=steady)
+        self.create_timer(POLL_EVERY_S, self._poll, clock=steady)
         self.create_timer(_ASK_EVERY_S, self._ask_parameters, clock=steady)
-        self.frame = self._gather()
+        self.frame = self._make_frame()
 
     def destroy_node(self) -> None:
-        """Let go of the mailboxes, which the node does not know, then of the node."""
-        for mailbox in self.mailboxes.values():
-            mailbox.close()
+        """Close the polled subscriptions, which the node does not know, then the node."""
+        for subscription in self.polled_subscriptions.values():
+            subscription.close()
         super().destroy_node()
 
     @property
-    def mailboxes(self) -> dict[Topic, PolledSubscription]:
-        """What is heard at the moment without waking the executor."""
+    def polled_subscriptions(self) -> dict[Topic, PolledSubscription]:
+        """Return the current subscriptions that do not wake the executor."""
         always = {FIXATION: self._fixations, GATE_STATUS: self._statuses}
-        return always | (self._sight.boxes if self._sight is not None else {})
+        return always | (self._feed.subscriptions if self._feed is not None else {})
 
-    def watched(self) -> None:
-        """Somebody looks at the page; to be said again and again while it is true."""
-        self._watched_s = time.monotonic()
+    def note_viewer(self) -> None:
+        """Note that the page has a viewer; call it repeatedly while it has one."""
+        self._viewer_s = time.monotonic()
 
     def show_truth(self, shown: bool) -> None:
-        """Show where everything really is, in simulation; or stop it."""
+        """Show the true positions of the objects, in simulation, or hide them."""
         self._truth_shown = shown
 
-    def switch(self, service: str, on: bool) -> None:
+    def call_switch(self, service: str, on: bool) -> None:
         """Call a std_srvs/SetBool; its answer goes to the log."""
         client = self._switches[service]
-        self._orders.put(partial(self._call, client, service, SetBool.Request(data=on)))
+        self._requests.put(partial(self._call, client, service, SetBool.Request(data=on)))
 
-    def trigger(self, service: str) -> None:
+    def call_trigger(self, service: str) -> None:
         """Call a std_srvs/Trigger; its answer goes to the log."""
-        self._orders.put(partial(self._call, self._triggers[service], service, Trigger.Request()))
+        self._requests.put(
+            partial(self._call, self._triggers[service], service, Trigger.Request())
+        )
 
-    def set(self, name: str, value: Any) -> None:
+    def set_remote_parameter(self, name: str, value: Any) -> None:
         """Set one of the parameters that the page knows; the answer goes to the log."""
-        self._orders.put(partial(self._set, name, value))
+        self._requests.put(partial(self._set, name, value))
 
-    def _look(self) -> None:
-        while not self._orders.empty():
-            self._orders.get()()
+    def _poll(self) -> None:
+        while not self._requests.empty():
+            self._requests.get()()
         now_s = time.monotonic()
-        self._open_or_close_eyes(now_s)
+        self._open_or_close_feed(now_s)
         fixations = self._fixations.take_messages()
         if any(message.name for message, _ in fixations):
-            self._model.hear_fixation()
+            self._model.record_fixation()
         for message, _ in self._statuses.take_messages():
-            self._model.hear_gate(status_values(message))
-        if self._sight is not None:
+            self._model.record_gate_status(status_values(message))
+        if self._feed is not None:
             if self._limits is not None:
-                self._sight.limits = self._limits
-            self._sight.show_truth(self._truth_shown)
-            self._sight.look(now_s, fixations)
-        self.frame = self._gather()
+                self._feed.limits = self._limits
+            self._feed.show_truth(self._truth_shown)
+            self._feed.poll_messages(now_s, fixations)
+        self.frame = self._make_frame()
 
-    def _open_or_close_eyes(self, now_s: float) -> None:
-        watched = now_s - self._watched_s < _WATCHED_FOR_S
-        if watched and self._sight is None:
-            self._model.watch(now_s)
-            self._sight = ImageFeed(self, self._model, self._joints)
+    def _open_or_close_feed(self, now_s: float) -> None:
+        has_viewer = now_s - self._viewer_s < _VIEWER_STAYS_S
+        if has_viewer and self._feed is None:
+            self._model.reset_silence(now_s)
+            self._feed = ImageFeed(self, self._model, self._joints)
             self._ask_parameters()
-        elif not watched and self._sight is not None:
-            self._sight.close()
-            self._sight = None
+        elif not has_viewer and self._feed is not None:
+            self._feed.close()
+            self._feed = None
 
-    def _gather(self) -> Frame:
-        now_s, model, sight = time.monotonic(), self._model, self._sight
-        ready = {**self._switches, **self._triggers}
+    def _make_frame(self) -> Frame:
+        now_s, model, feed = time.monotonic(), self._model, self._feed
+        clients = {**self._switches, **self._triggers}
         return Frame(
             state=model.state(now_s),
             facts=model.facts(),
-            lights=model.lights(now_s),
-            latencies_ms=dict(sight.latencies_ms) if sight else {},
+            node_health=model.node_health(now_s),
+            latencies_ms=dict(feed.latencies_ms) if feed else {},
             curve=model.curve_points(now_s),
             log=list(model.log),
             settings=dict(self._settings),
             choices=dict(self._choices),
-            services=frozenset(n for n, client in ready.items() if client.service_is_ready()),
+            services=frozenset(n for n, client in clients.items() if client.service_is_ready()),
             switches=model.switches(),
-            glance=sight.glance if sight else None,
-            picture=sight.picture if sight else None,
+            scene=feed.scene if feed else None,
+            picture=feed.picture if feed else None,
         )
 
     def _on_score(self, message: DiagnosticStatus) -> None:
-        self._model.hear_score(status_values(message).get('last') == 'success', time.monotonic())
+        self._model.record_trial(status_values(message).get('last') == 'success', time.monotonic())
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             level = Level(int.from_bytes(status.level, 'little'))
             values = status_values(status)
-            light = Light(status.name, level, status.message, time.monotonic(), values)
-            self._model.hear_health(light)
+            health = NodeHealth(status.name, level, status.message, time.monotonic(), values)
+            self._model.record_health(health)
 
     def _on_log(self, message: Log) -> None:
         if message.level >= LoggingSeverity.INFO:
-            self._model.hear_log(f'{message.name}: {message.msg}')
+            self._model.append_log(f'{message.name}: {message.msg}')
 
     def _call(self, client: Any, name: str, request: Any) -> None:
         if not client.service_is_ready():
-            self._model.hear_log(f'{name}: nobody offers this service')
+            self._model.append_log(f'{name}: no node offers this service')
             return
 
-        def answered(future: Future) -> None:
+        def log_answer(future: Future) -> None:
             answer = future.result()
             verdict = '' if answer.success else 'refused: '
-            self._model.hear_log(f'{name}: {verdict}{answer.message}')
+            self._model.append_log(f'{name}: {verdict}{answer.message}')
 
-        client.call_async(request).add_done_callback(answered)
+        client.call_async(request).add_done_callback(log_answer)
 
     def _set(self, name: str, value: Any) -> None:
         client = self._remote[_SETTINGS[name]]
         if not client.services_are_ready():
-            self._model.hear_log(f'{name}: {_SETTINGS[name]} is not there')
+            self._model.append_log(f'{name}: {_SETTINGS[name]} is not running')
             return
 
-        def answered(future: Future) -> None:
+        def log_result(future: Future) -> None:
             result = future.result().results[0]
             text = str(value) if result.successful else f'refused: {result.reason}'
-            self._model.hear_log(f'{name}: {text}')
+            self._model.append_log(f'{name}: {text}')
             self._ask_parameters()
 
-        client.set_parameters([Parameter(name, value=value)]).add_done_callback(answered)
+        client.set_parameters([Parameter(name, value=value)]).add_done_callback(log_result)
 
     def _ask_parameters(self) -> None:
-        if self._sight is None:
+        if self._feed is None:
             return
         gate = self._remote['gate']
         if gate.services_are_ready():
-            gate.get_parameters(list(LIMITS)).add_done_callback(self._note_limits)
+            gate.get_parameters(list(LIMITS)).add_done_callback(self._store_limits)
         for name, owner in _SETTINGS.items():
             client = self._remote[owner]
             if client.services_are_ready():
-                noted = partial(self._note_setting, name)
-                client.get_parameters([name]).add_done_callback(noted)
+                store = partial(self._store_setting, name)
+                client.get_parameters([name]).add_done_callback(store)
                 if name not in self._choices:
-                    described = partial(self._note_choices, name)
-                    client.describe_parameters([name]).add_done_callback(described)
+                    store_choices = partial(self._store_choices, name)
+                    client.describe_parameters([name]).add_done_callback(store_choices)
 
-    def _note_limits(self, future: Future) -> None:
+    def _store_limits(self, future: Future) -> None:
         values = [parameter_value_to_python(value) for value in future.result().values]
         if len(values) == len(LIMITS) and None not in values:
             self._limits = np.array(values).reshape(2, 2)
 
-    def _note_setting(self, name: str, future: Future) -> None:
+    def _store_setting(self, name: str, future: Future) -> None:
         values = [parameter_value_to_python(value) for value in future.result().values]
         if values and values[0] is not None:
             self._settings[name] = values[0]
 
-    def _note_choices(self, name: str, future: Future) -> None:
+    def _store_choices(self, name: str, future: Future) -> None:
         for descriptor in future.result().descriptors:
             if choices := choices_of(descriptor):
                 self._choices[name] = choices
@@ -262,18 +266,18 @@ class ViewNode(GraphNode):
 def main(args: list[str] | None = None) -> None:
     """Run the node and serve its page."""
     os.nice(_NICENESS)
-    # Only here: the web libraries are of no use to who makes the node alone.
+    # Imported here: a process that makes only the node does not load the web libraries.
     from ja_dashboard.server import Server
 
     with ExitStack() as servers:
 
-        def served() -> ViewNode:
+        def make_served_node() -> ViewNode:
             node = ViewNode()
             server = servers.enter_context(Server(node, node.config.host, node.config.port))
             print(f'{LIVE_PAGE}{server.address}', flush=True)
             return node
 
-        spin_node(served, args)
+        spin_node(make_served_node, args)
 
 
 if __name__ == '__main__':

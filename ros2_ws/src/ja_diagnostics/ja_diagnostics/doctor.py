@@ -16,6 +16,7 @@ from pathlib import Path
 import psutil
 
 from ja_diagnostics import image_stream
+from ja_runner.parts import is_installed
 
 _PYTHONS = ((3, 10), (3, 13))
 _SHM_MB = 64
@@ -156,6 +157,9 @@ def check_discovery() -> Finding:
 
 def check_graphics() -> Finding:
     """Render one image in a separate process, because a broken driver may end it."""
+    if not is_installed('ja_sim'):
+        text = 'not checked: the simulator is not installed'
+        return Finding('graphics', True, text, needed=False)
     found = subprocess.run(
         [sys.executable, '-c', _RENDER], capture_output=True, text=True, check=False
     )

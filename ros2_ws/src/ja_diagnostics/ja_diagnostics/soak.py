@@ -17,7 +17,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 
 from ja_common.graph_node import GraphNode
-from ja_common.private_executor import own_executor
+from ja_common.private_context import private_executor
 from ja_common.topics import DIAGNOSTICS
 from ja_runner.node_spec import NodeSpec
 from ja_runner.supervisor import Supervisor
@@ -80,7 +80,7 @@ class Soak:
 
     def run(self, seconds: float) -> int:
         """Run the graph for so many seconds and sample it; return the exit code of the graph."""
-        with own_executor() as executor:
+        with private_executor() as executor:
             rates = Rates(executor.context)
             executor.add_node(rates)
             end_s = time.monotonic() + seconds

@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import rclpy
-from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rich.table import Table
 
 from ja_common.core.config import ConfigError
 from ja_common.message_types import message_class
+from ja_common.private_context import private_executor
 from ja_common.qos_text import common_profile
 from ja_common.topics import TOPICS
 
@@ -36,13 +35,9 @@ class TopicRow:
 
 def measure_topics(seconds: float, arguments: Sequence[str] = ()) -> list[TopicRow]:
     """Watch the graph for some seconds; return its topics by name, none if no node is there."""
-    context = Context()
-    cli = ['--ros-args', *arguments] if arguments else []
-    rclpy.init(args=cli, context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-    node = Node('topics_table', context=context, enable_rosout=False)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    try:
+    with private_executor(arguments) as executor:
+        node = Node('topics_table', context=executor.context, enable_rosout=False)
+        executor.add_node(node)
         _spin(executor, _DISCOVERY_S)
         published = {
             name: types[0]
@@ -58,10 +53,6 @@ def measure_topics(seconds: float, arguments: Sequence[str] = ()) -> list[TopicR
         elapsed_s = time.monotonic() - began_s
         rates = {name: None if name in unknown else counts[name] / elapsed_s for name in published}
         return [_row(node, name, published[name], rates[name]) for name in sorted(published)]
-    finally:
-        executor.shutdown()
-        node.destroy_node()
-        context.try_shutdown()
 
 
 def table_of_topics(rows: Sequence[TopicRow]) -> Table:
@@ -120,7 +111,7 @@ def _quality(profile: QoSProfile) -> str:
     return ('reliable' if reliable else 'best effort') + (', latched' if latched else '')
 
 
-def _spin(executor: SingleThreadedExecutor, seconds: float) -> None:
+def _spin(executor: Executor, seconds: float) -> None:
     end_s = time.monotonic() + seconds
     while (left_s := end_s - time.monotonic()) > 0:
         executor.spin_once(timeout_sec=left_s)

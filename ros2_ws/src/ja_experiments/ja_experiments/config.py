@@ -23,38 +23,38 @@ IMAGE_PERIOD_S = 0.1
 
 @dataclass(frozen=True)
 class TaskConfig(Configuration):
-    """The simulated environment of section 3.1, and what is scored in it.
+    """The simulated environment of section 3.1.
 
-    Places of objects are drawn from the ranges of the scene in which the looks were rendered.
+    Objects are placed within the ranges of the scene in which the looks were rendered.
     """
 
     objects: int = parameter(5, 'objects in the environment, the attended one included', low=1)
     reliability: float = parameter(
-        1.0, 'share of the trials in which the caregiver looks at the object she means',
+        1.0, 'share of the trials in which the caregiver looks at the attended object',
         low=0.0, high=1.0,
     )  # fmt: skip
-    shakes_object: bool = parameter(False, 'the caregiver moves the object she means')
+    shakes_object: bool = parameter(False, 'the caregiver moves the attended object')
     view_pan_rad: float = parameter(
-        math.radians(18), 'half of the horizontal view', low=0.01, high=1.5
+        math.radians(18), 'half of the horizontal field of view [rad]', low=0.01, high=1.5
     )
     view_tilt_rad: float = parameter(
-        math.radians(13.5), 'half of the vertical view', low=0.01, high=1.5
+        math.radians(13.5), 'half of the vertical field of view [rad]', low=0.01, high=1.5
     )
     taught: str = parameter(
-        'fixation', 'where a trial has led: to the direction of the fixated object, or to the '
-        'posture that the executed commands have reached', choices=('fixation', 'executed'),
+        'fixation', 'end of a trial as the learner learns it: direction of the fixated object, '
+        'or posture reached by the executed commands', choices=('fixation', 'executed'),
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class ExperimentConfig:
-    """All that one run depends on, besides the looks and the seed."""
+    """All parameters of one run, besides the looks and the seed."""
 
     task: TaskConfig = field(default_factory=TaskConfig)
     network: NetworkConfig = field(default_factory=NetworkConfig)
     gating: GatingConfig = field(default_factory=GatingConfig)
     cycle: AttentionCycleConfig = field(
-        # The ideal head stands on the face when the trial begins, and wherever it was sent when
+        # The ideal head points at the face when the trial begins, and has reached its target when
         # the next image comes.
         default_factory=lambda: AttentionCycleConfig(
             dwell_s=0.0, settle_timeout_s=IMAGE_PERIOD_S / 2
@@ -67,9 +67,9 @@ class ExperimentConfig:
     limits: JointLimitsConfig = field(default_factory=JointLimitsConfig)
 
     def with_settings(self, settings: dict[str, Any]) -> ExperimentConfig:
-        """The same with some parameters changed, each given by its name as in a node's file.
+        """Return a copy with some parameters changed, each by its name as in a node's file.
 
-        Raises ConfigError for a name that does not exist or a value that does not fit.
+        Raises ConfigError for an unknown name or an invalid value.
         """
         parts = {part.name: getattr(self, part.name) for part in dataclasses.fields(self)}
         for name, value in settings.items():
@@ -81,7 +81,7 @@ class ExperimentConfig:
         return ExperimentConfig(**parts)
 
     def settings(self) -> dict[str, Any]:
-        """Every parameter by its name: what `with_settings` takes."""
+        """Return every parameter by its name, as `with_settings` takes them."""
         parts = [getattr(self, part.name) for part in dataclasses.fields(self)]
         return {name: getattr(part, name) for part in parts for name in _parameters(part)}
 
@@ -96,9 +96,9 @@ READINGS = {
         'pairs': 'last', 'learning_rate': 0.01, 'max_shifts': 10, 'sigmoid_slope_trials': 1.5e4,
     },
 }  # fmt: skip
-"""The two readings of what one trial teaches: all postures visited, or the last one only."""
+"""The two readings of the paper: one trial gives a pair for all postures visited, or the last."""
 
 
 def reading(name: str) -> ExperimentConfig:
-    """The experiment under one of the `READINGS`."""
+    """Return the configuration of one of the `READINGS`."""
     return ExperimentConfig().with_settings(READINGS[name])

@@ -1,8 +1,8 @@
 """Grids of experiments over seeds and parameters, on local processes or on a Dask cluster.
 
-A cell is one run: one set of settings, one seed. Its row is written to a file of its own as soon
-as it is finished, all or nothing, so that a sweep that was killed goes on where it was; at the end
-all rows become one Parquet table.
+A cell is one run: one set of settings, one seed. Its row is written to its own file as soon as it
+is finished. A sweep that was killed continues with the missing cells. At the end all rows become
+one Parquet table.
 
     reading: last           # 'all' or 'last' pairs; where the grid starts from
     trials: 300000
@@ -33,7 +33,7 @@ from distributed import Client, LocalCluster, as_completed
 from ja_common.core.config import ConfigError
 from ja_experiments.config import READINGS, ExperimentConfig, reading
 from ja_experiments.paper.experiment import BLOCKS, STAGES, Materials, Plan, run_seed
-from ja_experiments.progress import Progress
+from ja_experiments.progress_bars import ProgressBars
 
 TABLE_NAME = 'results.parquet'
 _CELLS = 'cells'
@@ -41,7 +41,7 @@ _CELLS = 'cells'
 
 @dataclass(frozen=True)
 class Cell:
-    """One run of a sweep: what differs from the reading, and the seed."""
+    """One run of a sweep: its changes to the reading, and its seed."""
 
     reading: str
     trials: int
@@ -49,20 +49,20 @@ class Cell:
     seed: int
 
     def config(self) -> ExperimentConfig:
-        """The configuration of the run."""
+        """Return the configuration of the run."""
         return reading(self.reading).with_settings(self.settings)
 
 
 @dataclass(frozen=True)
 class Grid:
-    """A sweep: its cells, and the scene whose looks all of them learn from."""
+    """A sweep: its cells, and the scene of the looks that all of them learn from."""
 
     scene: str
     cells: tuple[Cell, ...]
 
 
 def read_grid(path: Path) -> Grid:
-    """Read a sweep from YAML. Raises ConfigError that says what is wrong and where."""
+    """Read a sweep from YAML. Raises ConfigError that names the file and the error."""
     try:
         text = yaml.safe_load(path.read_text(encoding='utf-8'))
     except (OSError, yaml.YAMLError) as error:
@@ -97,14 +97,14 @@ def run_sweep(
     grid: Grid,
     materials: Materials,
     folder: Path,
-    progress: Progress,
+    progress: ProgressBars,
     scheduler: str | None = None,
     workers: int = 1,
 ) -> Path:
-    """Run the cells that `folder` does not hold yet; the path of the table of all.
+    """Run the cells that `folder` does not hold yet; return the path of the table of all cells.
 
     `scheduler`: address of a Dask scheduler, whose workers must have these packages installed;
-    None starts so many local worker processes. A cell whose worker dies is run again on another.
+    None starts `workers` local processes. If a worker dies, its cell is run on another one.
     """
     (folder / _CELLS).mkdir(parents=True, exist_ok=True)
     files = {folder / _CELLS / f'{_key(cell, materials)}.json': cell for cell in grid.cells}
@@ -118,7 +118,7 @@ def run_sweep(
 
 
 def run_cell(cell: Cell, materials: Materials) -> dict[str, Any]:
-    """One run, as one row: settings, seed, online success by block, the learner alone."""
+    """Run one cell; return its row: settings, seed, online success by block, learner alone."""
     config, plan = cell.config(), Plan(trials=cell.trials, seeds=(cell.seed,))
     run = run_seed(config, plan, materials, cell.seed)
     success = run.online.success[: BLOCKS * plan.block].reshape(BLOCKS, plan.block)
@@ -140,28 +140,28 @@ def run_cell(cell: Cell, materials: Materials) -> dict[str, Any]:
 
 
 def _run_cells(
-    client: Client, cells: dict[Path, Cell], materials: Materials, progress: Progress
+    client: Client, cells: dict[Path, Cell], materials: Materials, progress: ProgressBars
 ) -> None:
-    # One copy a worker, and not pinned to any: a worker that dies takes nothing with it.
+    # One copy per worker, pinned to none: the death of a worker loses no data.
     shared = client.submit(lambda: materials, pure=False)
     jobs = {
         client.submit(run_cell, cell, shared, pure=False): path for path, cell in cells.items()
     }
     with progress.bar('cells', len(cells)) as advance:
         for job, row in as_completed(jobs, with_results=True):
-            _keep(jobs[job], row)
+            _write_row(jobs[job], row)
             advance(1)
 
 
-def _keep(path: Path, row: dict[str, Any]) -> None:
-    """Write a finished cell so that it is there as a whole or not at all."""
+def _write_row(path: Path, row: dict[str, Any]) -> None:
+    """Write the row of a finished cell in one atomic step."""
     temporary = path.with_suffix(f'.{os.getpid()}')
     temporary.write_text(json.dumps(row), encoding='utf-8')
     os.replace(temporary, path)
 
 
 def _key(cell: Cell, materials: Materials) -> str:
-    """The same for the same run, whatever else the sweep holds; another one for other looks."""
+    """Return a name that depends on the run and the looks only, not on the rest of the sweep."""
     run = [cell.reading, cell.trials, cell.config().settings(), cell.seed, repr(materials.places)]
     digest = hashlib.sha256(json.dumps(run, sort_keys=True).encode())
     for looks in (materials.pool, materials.fresh):

@@ -1,4 +1,4 @@
-"""The learner of a node: it learns beside the images, and what it learned outlives the node."""
+"""The learner of a node: it learns in a thread of its own, and is saved in checkpoints."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,24 +15,25 @@ from ja_learning.core.learner import Learner, Predictor
 from ja_learning.core.trial import Trial
 
 MANY_WAITING = 10
-"""So many trials that wait to be learned mean that learning cannot keep up."""
+"""When more trials than this wait to be learned, learning cannot keep up."""
 
 BEHIND_IN_LOCKSTEP = 1
-"""Learning a trial may take as long as living the next one, on another processor."""
+"""Learning a trial may take as long as the next trial lasts, on another processor."""
 
 CLOSING_S = 1.0
-"""So long may learning go on when the node is asked to end [s]; then comes the last checkpoint."""
+"""So long may learning go on when the node ends [s]; then the last checkpoint is written."""
 
 
 class PersistentLearner:
-    """Goes on from the newest good checkpoint, saves itself as it goes, and when it is closed.
+    """Continues from the newest good checkpoint; is saved every so many trials, and at the end.
 
     Offers the services `save_checkpoint` and `load_checkpoint`, and reports to the node's health.
     """
 
     def __init__(self, node: GraphNode, make: Callable[[], Learner], lockstep: bool) -> None:
-        """`make` gives an untrained learner. `lockstep`: what is believed depends on no clock.
+        """Make the learner, and advertise its services.
 
+        `make` makes an untrained learner. `lockstep`: what is believed depends on no clock.
         Raises ConfigError or OSError when the checkpoints cannot be used.
         """
         self._node = node
@@ -42,71 +43,71 @@ class PersistentLearner:
         learner = make()
         if self._checkpoints is not None and self._checkpoints.config.resume:
             self._resume(learner)
-        self._lessons = self._at_work(learner)
-        self.tell()
+        self._background = self._in_background(learner)
+        self.report_health()
         node.advertise_service(Trigger, 'save_checkpoint', self._on_save)
         node.advertise_service(Trigger, 'load_checkpoint', self._on_load)
 
     @property
     def predictor(self) -> Predictor:
-        """What is believed now; in lockstep, what was believed a trial ago."""
-        return self._lessons.predictor
+        """Return what is believed now; in lockstep, what was believed a trial ago."""
+        return self._background.predictor
 
-    def learn(self, trial: Trial) -> None:
-        """Hand over a finished trial; returns at once."""
-        self._lessons.learn(trial)
+    def update(self, trial: Trial) -> None:
+        """Hand over a finished trial; return at once."""
+        self._background.update(trial)
 
-    def begin_anew(self) -> None:
-        """Forget everything; a restart will not bring it back."""
+    def reset(self) -> None:
+        """Forget everything, in the newest checkpoint too."""
         self._replace(self._make())
         if self._checkpoints is None:
             return
         try:
-            self._lessons.ask(self._checkpoints.save)
+            self._background.call_with_learner(self._checkpoints.save)
         except (ValueError, OSError) as error:
             text = f'a restart would bring back what was forgotten: {error}'
-            self._node.problem('checkpoints', text)
+            self._node.report_problem('checkpoints', text)
 
-    def tell(self) -> None:
-        """Put into the node's health how far learning is, and what went wrong with it."""
-        waiting = self._lessons.waiting
-        self._node.health.values['trials learned'] = str(self._lessons.trials)
+    def report_health(self) -> None:
+        """Put the progress of learning, and its errors, into the node's health."""
+        waiting = self._background.waiting
+        self._node.health.values['trials learned'] = str(self._background.trials)
         self._node.health.values['of these still waiting'] = str(waiting)
-        for error in self._lessons.pop_errors():
-            self._node.problem('learning', f'learning: {error}')
+        for error in self._background.pop_errors():
+            self._node.report_problem('learning', f'learning: {error}')
         if waiting > MANY_WAITING:
             text = f'more than {MANY_WAITING} trials wait to be learned: replay less after each'
-            self._node.problem('waiting', text, Level.WARN)
+            self._node.report_problem('waiting', text, Level.WARN)
 
     def close(self) -> None:
-        """Learn and save what has been lived, and end."""
-        learner = self._lessons.close(CLOSING_S)
-        if learner.trials < self._lessons.trials:
-            lost = self._lessons.trials - learner.trials
-            self._node.problem('learning', f'{lost} trials were not learned before the end')
+        """Learn and save the trials handed over, and end."""
+        learner = self._background.close(CLOSING_S)
+        if learner.trials < self._background.trials:
+            lost = self._background.trials - learner.trials
+            self._node.report_problem('learning', f'{lost} trials were not learned before the end')
         if self._checkpoints is None:
             return
         try:
             self._checkpoints.save_when_changed(learner)
         except (ValueError, OSError) as error:
-            self._node.problem('checkpoints', f'the last trials are lost: {error}')
+            self._node.report_problem('checkpoints', f'the last trials are lost: {error}')
         self._checkpoints.close()
 
     def _open(self, config: CheckpointConfig) -> CheckpointFolder | None:
         if not config.checkpoint_folder:
             return None
-        return CheckpointFolder(self._node.folder_of_its_own(config.checkpoint_folder), config)
+        return CheckpointFolder(self._node.namespaced_folder(config.checkpoint_folder), config)
 
-    def _at_work(self, learner: Learner) -> BackgroundLearner:
-        # A lesson is not urgent, even where answers are (`realtime_priority`).
-        return BackgroundLearner(learner, self._after_lesson, self._behind, use_default_scheduling)
+    def _in_background(self, learner: Learner) -> BackgroundLearner:
+        # An update is not urgent, even where answers are (`realtime_priority`).
+        return BackgroundLearner(learner, self._after_update, self._behind, use_default_scheduling)
 
     def _replace(self, learner: Learner) -> None:
-        self._lessons.close(0.0)
-        self._lessons = self._at_work(learner)
+        self._background.close(0.0)
+        self._background = self._in_background(learner)
 
-    def _after_lesson(self, learner: Learner) -> None:
-        """In the thread of the lessons."""
+    def _after_update(self, learner: Learner) -> None:
+        """Run in the thread that learns."""
         self._node.health.values['last error [rad]'] = f'{learner.last_error_rad:.3f}'
         if self._checkpoints is not None:
             self._checkpoints.save_when_due(learner)
@@ -119,14 +120,14 @@ class PersistentLearner:
     def _resume(self, learner: Learner) -> Path | None:
         path, refused = self._kept_in().resume_into(learner)
         for text in refused:
-            self._node.problem('checkpoints', f'refused: {text}', Level.WARN)
+            self._node.report_problem('checkpoints', f'refused: {text}', Level.WARN)
         if path is not None:
             self._node.get_logger().info(f'goes on from {path}, {learner.trials} trials')
         return path
 
     def _on_save(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        path = self._lessons.ask(self._kept_in().save)
-        response.message = f'{self._lessons.trials} trials saved to {path}'
+        path = self._background.call_with_learner(self._kept_in().save)
+        response.message = f'{self._background.trials} trials saved to {path}'
         response.success = True
         return response
 
@@ -136,6 +137,6 @@ class PersistentLearner:
         if path is None:
             raise ValueError(f'no checkpoint in {self._kept_in().folder}')
         self._replace(learner)
-        response.message = f'{self._lessons.trials} trials loaded from {path}'
+        response.message = f'{self._background.trials} trials loaded from {path}'
         response.success = True
         return response

@@ -18,7 +18,7 @@ from ja_perception.core.frame_sources import SourceError, open_source
 
 @dataclass(frozen=True)
 class CameraConfig(Configuration):
-    """Where the pictures come from, and how they are sent."""
+    """Where the pictures come from, and at which rate they are published."""
 
     source: str = parameter(
         '0', 'device number or path, video file, folder of images, or image file'
@@ -26,7 +26,7 @@ class CameraConfig(Configuration):
     rate_hz: float = parameter(
         0.0, "pictures a second; 0: the source's own rate, or 15", low=0.0, high=1000.0
     )
-    loop: bool = parameter(True, 'begin anew at the end of a file or folder')
+    loop: bool = parameter(True, 'restart at the end of a file or folder')
     still_s: float = parameter(
         5.0, 'time for which each picture of a folder is shown', low=0.0, high=3600.0
     )
@@ -48,16 +48,16 @@ class CameraNode(GraphNode):
         except SourceError as error:
             # An OSError ends the node with this one sentence.
             raise OSError(str(error)) from None
-        self._says_image = self.create_topic_publisher(IMAGE)
-        self._says_info = self.create_topic_publisher(CAMERA_INFO)
+        self._image_publisher = self.create_topic_publisher(IMAGE)
+        self._info_publisher = self.create_topic_publisher(CAMERA_INFO)
         rate_hz = config.rate_hz or self._source.rate_hz or 15.0
-        self.create_timer(1 / rate_hz, self._show_next)
+        self.create_timer(1 / rate_hz, self._publish_next)
 
-    def _show_next(self) -> None:
+    def _publish_next(self) -> None:
         try:
             frame = self._source.next_frame()
         except SourceError as error:
-            self.problem('source', str(error))
+            self.report_problem('source', str(error))
             return
         if frame is None:
             self.get_logger().info(f"'{self._config.source}' has ended")
@@ -66,11 +66,11 @@ class CameraNode(GraphNode):
         header = Header(stamp=stamp, frame_id=self._config.frame_id)
         height, width = frame.shape[:2]
         camera = CameraModel.from_field_of_view(width, height, self._config.field_of_view_rad)
-        self._says_info.publish(encode_camera_info(header, width, height, camera.fx))
-        self._says_image.publish(encode_image(frame, header.stamp, header.frame_id))
+        self._info_publisher.publish(encode_camera_info(header, width, height, camera.fx))
+        self._image_publisher.publish(encode_image(frame, header.stamp, header.frame_id))
 
     def destroy_node(self) -> None:
-        """Give the device back, then end."""
+        """Release the device, then destroy the node."""
         self._source.close()
         super().destroy_node()
 

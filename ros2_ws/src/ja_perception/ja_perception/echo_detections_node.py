@@ -27,7 +27,7 @@ class EchoDetectionsNode(GraphNode):
 
 
 def table(stamp_ns: int, detections: list[Detection]) -> str:
-    """The detections of one image as text."""
+    """Return the detections of one image as text."""
     title = f'{stamp_ns / 1e9:.3f} s: {len(detections)} seen'
     return '\n'.join([title, *([_HEAD] if detections else []), *map(_line, detections)])
 
@@ -45,7 +45,7 @@ def main(args: Sequence[str] | None = None) -> None:
     try:
         spin_node(EchoDetectionsNode, args)
     except BrokenPipeError:
-        # The reader (`| head`) has seen enough.
+        # The reader (`| head`) has closed the pipe.
         sys.stderr.close()
 
 

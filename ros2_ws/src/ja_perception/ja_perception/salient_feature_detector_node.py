@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, CompressedImage
 from std_msgs.msg import Header
 
-from ja_common.core.annotate import annotated
+from ja_common.core.annotate import annotate_image
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.config import Configuration, parameter
 from ja_common.core.detection import Detection, caregiver_face
@@ -44,13 +44,13 @@ from ja_perception.core.face_finders import FACE_FINDERS
 
 @dataclass(frozen=True)
 class InputConfig(Configuration):
-    """What the node hears, and how long it waits for it."""
+    """What the node subscribes to, and how long it waits for it."""
 
     face_finder: str = parameter(
         'blazeface', 'how faces are found: a network, a cascade, or the template of the paper',
         choices=tuple(FACE_FINDERS),
     )  # fmt: skip
-    compressed: bool = parameter(False, 'hear image_raw/compressed instead of image_raw')
+    compressed: bool = parameter(False, 'subscribe to image_raw/compressed instead of image_raw')
     field_of_view_rad: float = parameter(
         math.radians(36), 'horizontal view of a camera that sends no calibration',
         low=0.01, high=3.0,
@@ -75,7 +75,7 @@ class SalientFeatureDetectorNode(GraphNode):
             **{part.name: self._tunable(part) for part in fields(DetectorConfig)}
         )
         self._detector = SalientFeatureDetector(self._finder, self._config)
-        self._seen: tuple[int, Percept] | None = None
+        self._newest_percept: tuple[int, Percept] | None = None
         self._calibration: CameraInfo | None = None
         silent_after_s = self._input.silent_after_s
         self._synchroniser = Synchroniser(
@@ -86,11 +86,11 @@ class SalientFeatureDetectorNode(GraphNode):
             is_calibrated=lambda: self._calibration is not None,
         )
 
-        self._says_detections = self.create_topic_publisher(DETECTIONS)
-        self._says_target = self.create_topic_publisher(TARGET)
-        self._says_face = self.create_topic_publisher(FACE)
-        self._says_face_image = self.create_topic_publisher(FACE_IMAGE)
-        self._says_annotated = self.create_topic_publisher(IMAGE_ANNOTATED)
+        self._detections_publisher = self.create_topic_publisher(DETECTIONS)
+        self._target_publisher = self.create_topic_publisher(TARGET)
+        self._face_publisher = self.create_topic_publisher(FACE)
+        self._face_image_publisher = self.create_topic_publisher(FACE_IMAGE)
+        self._annotated_publisher = self.create_topic_publisher(IMAGE_ANNOTATED)
         self._image_topic = IMAGE_COMPRESSED if self._input.compressed else IMAGE
         self.subscribe(CAMERA_INFO, self._on_camera_info, silent_after_s)
         self._synchroniser.call_with(
@@ -100,12 +100,12 @@ class SalientFeatureDetectorNode(GraphNode):
         )
 
     def _tunable(self, part: Field) -> Any:
-        """A part of the configuration that may change; the detector then starts anew."""
+        """Declare a part of the configuration that may change; the detector then restarts."""
 
         def changed(config: Any) -> None:
             self._config = replace(self._config, **{part.name: config})
             self._detector = SalientFeatureDetector(self._finder, self._config)
-            self._seen = None
+            self._newest_percept = None
 
         return self.configure(part.default_factory, changed)  # type: ignore[arg-type]
 
@@ -121,7 +121,7 @@ class SalientFeatureDetectorNode(GraphNode):
             found.posture_or_none,
         )
         if posture is None:
-            self.problem(
+            self.report_problem(
                 'posture',
                 'no joint state for the stamp of the image: the camera is taken to stand '
                 'still, and no face counts as attended',
@@ -131,32 +131,35 @@ class SalientFeatureDetectorNode(GraphNode):
         compressed = isinstance(message, CompressedImage)
         image = decode_compressed(message) if compressed else decode_image(message)
         camera = self._camera(image)
-        if self._seen is None or self._seen[0] != stamp_ns:
-            self._seen = stamp_ns, self._detector.detect(image, stamp_ns, camera, posture)
+        if self._newest_percept is None or self._newest_percept[0] != stamp_ns:
+            self._newest_percept = (
+                stamp_ns,
+                self._detector.detect(image, stamp_ns, camera, posture),
+            )
         # The same image again (a sim that lost the answer): the same answer again.
-        percept = self._seen[1]
-        self._tell(message.header, percept)
+        percept = self._newest_percept[1]
+        self._publish_percept(message.header, percept)
         seconds = time.perf_counter() - start
         self.health.values['time an image [ms]'] = f'{1000 * seconds:.2f}'
-        if self._says_annotated.get_subscription_count():
-            self._draw(message.header, image, percept, camera, seconds)
+        if self._annotated_publisher.get_subscription_count():
+            self._publish_annotated(message.header, image, percept, camera, seconds)
 
-    def _tell(self, header: Header, percept: Percept) -> None:
-        # The face image goes first: whoever reads `attended` may count on it.
+    def _publish_percept(self, header: Header, percept: Percept) -> None:
+        # The face image goes first: a node that reads `attended` can rely on it.
         if percept.face_image is not None:
-            self._says_face_image.publish(
+            self._face_image_publisher.publish(
                 encode_image(percept.face_image, header.stamp, header.frame_id)
             )
-        self._says_detections.publish(encode_detections(header, percept.detections))
-        # For people: mostly nobody is there.
+        self._detections_publisher.publish(encode_detections(header, percept.detections))
+        # For displays only: mostly no node subscribes.
         for publisher, detection in (
-            (self._says_target, percept.target),
-            (self._says_face, caregiver_face(percept.detections)),
+            (self._target_publisher, percept.target),
+            (self._face_publisher, caregiver_face(percept.detections)),
         ):
             if detection is not None and publisher.get_subscription_count():
                 publisher.publish(_point(header, detection))
 
-    def _draw(
+    def _publish_annotated(
         self,
         header: Header,
         image: NDArray[np.uint8],
@@ -165,17 +168,17 @@ class SalientFeatureDetectorNode(GraphNode):
         seconds: float,
     ) -> None:
         d_th_rad = self._config.attention.d_th_rad
-        drawn = annotated(image, percept.detections, percept.face_image, camera, d_th_rad, seconds)
-        self._says_annotated.publish(encode_image(drawn, header.stamp, header.frame_id))
+        drawn = annotate_image(image, percept.detections, percept.face_image, camera, d_th_rad, seconds)
+        self._annotated_publisher.publish(encode_image(drawn, header.stamp, header.frame_id))
 
     def _camera(self, image: NDArray[np.uint8]) -> CameraModel:
-        """The calibrated camera for images of this size, or an ideal one."""
+        """Return the calibrated camera for images of this size, or an ideal one."""
         height, width = image.shape[:2]
         camera = decode_camera_info(self._calibration, width, height)
         if camera is not None:
             return camera
         field_of_view_rad = self._input.field_of_view_rad
-        self.problem(
+        self.report_problem(
             'calibration',
             'the camera is not calibrated: a horizontal view of '
             f'{math.degrees(field_of_view_rad):.0f} degrees is assumed (field_of_view_rad)',

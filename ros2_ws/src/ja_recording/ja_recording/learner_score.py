@@ -1,4 +1,4 @@
-"""A learner's curve over recorded trials: asked before every lesson, then taught it."""
+"""A learner's curve over recorded trials: on each it proposes first, then it learns from it."""
 
 import csv
 from collections.abc import Callable, Sequence
@@ -16,8 +16,8 @@ class ScoredTrial:
     """One recorded trial that ended in a fixation, on the image of this stamp.
 
     `off_rad`: angle from what the learner proposed in the look at the caregiver to what was
-    fixated. `success`: was the object nearest to the proposal the one she meant? `recorded`: was
-    what was fixated the one she meant? Both None without the truth of a simulation.
+    fixated. `success`: whether the attended object was the nearest to the proposal. `recorded`:
+    whether the attended object was fixated. Both None without the truth of a simulation.
     """
 
     trial: int
@@ -32,7 +32,7 @@ def score_learner(
     arguments: Sequence[str] = (),
     progress: Callable[[int], None] = lambda stamp_ns: None,
 ) -> list[ScoredTrial]:
-    """Drive a learning module, with these ROS arguments, through a recording.
+    """Drive a learning module, with these ROS arguments, through a recording; score its trials.
 
     Raises ConfigError when the recording lacks a topic that a learner needs.
     """
@@ -40,16 +40,16 @@ def score_learner(
         ScoredTrial(
             number,
             trial.fixation_ns,
-            float(angle_between(trial.proposed, trial.lesson.led_to)),
+            float(angle_between(trial.proposed, trial.trial.led_to)),
             trial.is_joint_attention(trial.proposed),
-            trial.is_joint_attention(trial.lesson.led_to),
+            trial.is_joint_attention(trial.trial.led_to),
         )
         for number, trial in enumerate(recorded_trials(recording, arguments, progress), 1)
     ]
 
 
 def write_csv(trials: Sequence[ScoredTrial], path: Path) -> None:
-    """One row a trial; without truth, empty where it would be needed."""
+    """Write one row a trial; without truth, the fields that need it are empty."""
     with path.open('w', newline='') as file:
         writer = csv.DictWriter(file, [field.name for field in fields(ScoredTrial)])
         writer.writeheader()
@@ -59,6 +59,6 @@ def write_csv(trials: Sequence[ScoredTrial], path: Path) -> None:
 
 
 def success_rate(trials: Sequence[ScoredTrial], of: str = 'success') -> Rate:
-    """Share of successes among the trials of which the truth is known."""
+    """Return the share of successes among the trials of which the truth is known."""
     known = [getattr(trial, of) for trial in trials if trial.success is not None]
     return Rate(sum(known), len(known))

@@ -91,10 +91,10 @@ class RecorderNode(GraphNode):
             'messages dropped': str(self.writer.dropped),
         }
         if self.writer.failure:
-            self.problem('writing', self.writer.failure)
+            self.report_problem('writing', self.writer.failure)
         elif self.writer.dropped:
             text = f'the disk is too slow: {self.writer.dropped} messages were dropped'
-            self.problem('writing', text, Level.WARN)
+            self.report_problem('writing', text, Level.WARN)
 
     def _is_excluded(self, name: str) -> bool:
         hidden = any(part.startswith('_') for part in name.split('/'))
@@ -111,7 +111,7 @@ class RecorderNode(GraphNode):
             schema_of(types[0])
             kind = message_class(types[0])
         except ConfigError as error:
-            self.problem(name, f'{name} is not recorded: {error}', Level.WARN)
+            self.report_problem(name, f'{name} is not recorded: {error}', Level.WARN)
             return
         offered = [publisher.qos_profile for publisher in publishers]
         channel = Channel(

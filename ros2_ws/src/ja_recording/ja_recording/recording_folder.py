@@ -1,5 +1,6 @@
 """Write a folder of MCAP files that is flushed, split, and bounded in size and age."""
 
+import os
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -96,7 +97,8 @@ class RecordingFolder:
         self._writer.flush()
         file = self._files[-1]
         age_s = time.monotonic() - file.began_s
-        full = 0 < self._limits.split_mb * _MB <= self._stream.tell()
+        size = os.fstat(self._stream.fileno()).st_size
+        full = 0 < self._limits.split_mb * _MB <= size
         if file.counts and (full or 0 < self._limits.split_s <= age_s):
             self._finish_file()
             self._open_file()

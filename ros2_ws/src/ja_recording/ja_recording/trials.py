@@ -1,4 +1,8 @@
-"""The trials of a recording, as a learner lived them: the real `learning_module` cuts them out."""
+"""The trials of a recording: the real `learning_module` cuts them out, as it did online.
+
+The node, and not the trial pipeline alone, is driven: which messages make one image, and the
+posture at its stamp, are then decided by the same code as in a running graph.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,7 @@ import importlib
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,7 +35,7 @@ if TYPE_CHECKING:  # a rig without the simulator has recordings without a truth
 
 _NEEDED = (DETECTIONS, FIXATION, JOINT_STATES)
 _SHIFTS = ('VF', 'LM')
-# So far may the learner's answer to an image lag behind the truth about it, in images.
+# How many images the learner's answer to an image may come later than the truth about it.
 _TRUTHS_KEPT = 100
 
 
@@ -38,14 +43,14 @@ _TRUTHS_KEPT = 100
 class RecordedTrial:
     """One recorded trial that ended in a fixation.
 
-    `lesson`: what the learner was taught. `look_ns`, `fixation_ns`: stamps of the image on which
+    `trial`: what the learner learned from. `look_ns`, `fixation_ns`: stamps of the image on which
     the face was last seen, and of the one on which something was fixated. `proposed`: (2,) [rad],
-    where the learner would have turned from the look, before it was taught. `source`: whose shift
-    led to the fixation, VF or LM; None where the gate was not recorded. `truth`: at the look, from
-    a simulation; None on a rig.
+    where the learner would have turned from the look, before it learned from the trial. `source`:
+    whose shift led to the fixation, VF or LM; None where the gate was not recorded. `truth`: at
+    the look, from a simulation; None on a rig.
     """
 
-    lesson: Trial
+    trial: Trial
     look_ns: int
     fixation_ns: int
     proposed: NDArray[np.float64]
@@ -53,14 +58,14 @@ class RecordedTrial:
     truth: TruthAt | None
 
     @property
-    def meant(self) -> NDArray[np.float64] | None:
-        """Direction (2,) [rad] of the object that she attended to, where the truth is known."""
+    def attended_direction(self) -> NDArray[np.float64] | None:
+        """Return the direction (2,) [rad] of the attended object, where the truth is known."""
         if self.truth is None or self.truth.attended < 0:
             return None
         return self.truth.directions[self.truth.attended]
 
     def is_joint_attention(self, direction: NDArray[np.float64]) -> bool | None:
-        """Is the object nearest to this direction the one she meant? None without truth."""
+        """Return whether the attended object is nearest to this direction; None without truth."""
         if self.truth is None or self.truth.attended < 0:
             return None
         nearest = int(np.argmin(angle_between(self.truth.directions, direction)))
@@ -72,25 +77,31 @@ def recorded_trials(
     arguments: Sequence[str] = (),
     progress: Callable[[int], None] = lambda stamp_ns: None,
 ) -> Iterator[RecordedTrial]:
-    """Drive a learning module, with these ROS arguments, through a recording: trial by trial.
+    """Drive a learning module, with these ROS arguments, through a recording; yield its trials.
 
     Raises ConfigError when the recording lacks a topic that a learner needs.
     """
     lacking = [topic.name for topic in _NEEDED if f'/{topic.name}' not in recording.topics]
     if lacking:
         raise ConfigError(f'the recording lacks {", ".join(lacking)}: nothing to learn from')
-    node = importlib.import_module('ja_learning.learning_module_node')
-    with driven(node.LearningModuleNode, ['-p', 'lockstep:=true', *arguments]) as learner:
-        witness = TrialExtractor(learner)
+    module = importlib.import_module('ja_learning.learning_module_node')
+    ended: list[tuple[Trial, int]] = []
+
+    def remember_trial(trial: Trial, stamp_ns: int) -> None:
+        ended.append((trial, stamp_ns))
+
+    make_node = partial(module.LearningModuleNode, on_update=remember_trial)
+    with driven(make_node, ['-p', 'lockstep:=true', *arguments]) as learner:
+        extractor = TrialExtractor(learner, ended)
         ours = {f'/{topic.name}' for topic in (SIM_TRUTH, GATE_STATUS)}
-        for message in recording.messages(learner.hears | ours):
-            yield from witness.hear(message.topic.name.lstrip('/'), message)
+        for message in recording.messages(learner.subscribed_topics | ours):
+            yield from extractor.process_message(message.topic.name.lstrip('/'), message)
             progress(message.stamp_ns)
 
 
 @dataclass(frozen=True)
 class _Look:
-    """What was proposed, (2,) [rad] from where the head was, and the truth of that moment."""
+    """A proposal, (2,) [rad] from where the head was, and the truth at that stamp."""
 
     stamp_ns: int
     delta: NDArray[np.float64]
@@ -100,11 +111,10 @@ class _Look:
 class TrialExtractor:
     """Follows a driven learner through a recording; it alone looks at the truth."""
 
-    def __init__(self, learner: DrivenNode) -> None:
+    def __init__(self, learner: DrivenNode, ended: list[tuple[Trial, int]]) -> None:
+        """Follow this learner, whose `on_update` appends trials and their stamps to `ended`."""
         self._learner = learner
-        self._teach = learner.node.teach
-        self._taught: list[tuple[Trial, int]] = []
-        learner.node.teach = self._on_lesson_callback
+        self._ended = ended
         value = learner.node.get_parameter
         names = [field.name for field in fields(JointConfig)]
         self._joints = JointCodec(JointConfig(**{name: value(name).value for name in names}))
@@ -113,31 +123,27 @@ class TrialExtractor:
         self._look: _Look | None = None
         self._source: str | None = None
 
-    def hear(self, topic: str, message: RecordedMessage) -> Iterator[RecordedTrial]:
-        """One message: ours first, then the learner's; the trials that it has ended."""
+    def process_message(self, topic: str, message: RecordedMessage) -> Iterator[RecordedTrial]:
+        """Use one message, then hand it to the learner; yield the trials that it has ended."""
         decoded = deserialize_message(message.data, message_class(message.topic.type_name))
         if topic == SIM_TRUTH.name:
             from ja_sim.truth_codec import decode_truth
 
             self._truths.append(decode_truth(decoded))
         elif topic == GATE_STATUS.name:
-            said = status_values(decoded)
-            self._source = said['source'] if said.get('source') in _SHIFTS else self._source
+            source = status_values(decoded).get('source')
+            self._source = source if source in _SHIFTS else self._source
         elif topic == DETECTIONS.name:
             face = caregiver_face(decode_detections(decoded))
             if face is not None and face.attended:
                 self._looks_at, self._source = to_ns(decoded.header.stamp), None
-        for said_topic, answer in self._learner.hear(message):
-            if said_topic.lstrip('/') == LM_DELTA.name:
+        for answer_topic, answer in self._learner.process_message(message):
+            if answer_topic.lstrip('/') == LM_DELTA.name:
                 self._on_proposal(answer)
-        while self._taught:
-            trial = self._on_lesson(*self._taught.pop(0))
-            if trial is not None:
-                yield trial
-
-    def _on_lesson_callback(self, lesson: Trial, stamp_ns: int) -> None:
-        self._taught.append((lesson, stamp_ns))
-        self._teach(lesson, stamp_ns)
+        while self._ended:
+            trial, stamp_ns = self._ended.pop(0)
+            if trial.fixation is not None and (look := self._pop_look()) is not None:
+                yield self._recorded_trial(trial, look, stamp_ns)
 
     def _on_proposal(self, message: Any) -> None:
         delta = self._joints.decode(message)
@@ -146,15 +152,16 @@ class TrialExtractor:
             known = (truth for truth in self._truths if truth.stamp_ns == stamp_ns)
             self._look = _Look(stamp_ns, delta, next(known, None))
 
-    def _on_lesson(self, lesson: Trial, fixation_ns: int) -> RecordedTrial | None:
+    def _pop_look(self) -> _Look | None:
         look, self._look = self._look, None
-        if look is None:
-            return None
+        return look
+
+    def _recorded_trial(self, trial: Trial, look: _Look, fixation_ns: int) -> RecordedTrial:
         return RecordedTrial(
-            lesson,
+            trial,
             look.stamp_ns,
             fixation_ns,
-            lesson.postures[0] + look.delta,
+            trial.postures[0] + look.delta,
             self._source,
             look.truth,
         )

@@ -3,12 +3,12 @@
 import signal
 from collections.abc import Callable, Sequence
 
-import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
 
 from ja_common.core.config import ConfigError
 from ja_common.executor import CachedWaitSetExecutor
+from ja_common.private_context import private_context
 from ja_runner.node_spec import NodeSpec
 
 
@@ -22,10 +22,25 @@ def run_in_one_process(
 
     Returns the exit code: 0, or 1 when a node cannot be made (`report` gets one sentence).
     """
-    context = Context()
-    rclpy.init(args=[], context=context, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-    executor = CachedWaitSetExecutor(context=context)
     stop = _StopSignal()
+    try:
+        with private_context() as context:
+            _run_nodes(graph, make_observer, lambda: stop.received or done(), context)
+    except (ConfigError, OSError) as error:
+        report(f'error: {error}')
+        return 1
+    finally:
+        stop.restore()
+    return 0
+
+
+def _run_nodes(
+    graph: Sequence[NodeSpec],
+    make_observer: Callable[[Context], Node],
+    done: Callable[[], bool],
+    context: Context,
+) -> None:
+    executor = CachedWaitSetExecutor(context=context)
     nodes: list[Node] = []
     try:
         for spec in graph:
@@ -36,18 +51,12 @@ def run_in_one_process(
         nodes.append(make_observer(context))
         for node in nodes:
             executor.add_node(node)
-        while not (stop.received or done()):
+        while not done():
             executor.spin_once(timeout_sec=0.1)
-    except (ConfigError, OSError) as error:
-        report(f'error: {error}')
-        return 1
     finally:
         executor.shutdown()
         for node in reversed(nodes):
             node.destroy_node()
-        context.try_shutdown()
-        stop.restore()
-    return 0
 
 
 class _StopSignal:

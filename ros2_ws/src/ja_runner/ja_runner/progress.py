@@ -62,7 +62,7 @@ class ProgressNode(GraphNode):
         values = status_values(message)
         success = values.get('last') == 'success'
         self.objects = int(values.get('objects', '1'))
-        self.curve.add(success, float(self.gate.get('p_lm', 'nan')), self.elapsed_s)
+        self.curve.record_trial(success, float(self.gate.get('p_lm', 'nan')), self.elapsed_s)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:

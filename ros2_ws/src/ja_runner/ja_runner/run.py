@@ -10,12 +10,13 @@ from rclpy.context import Context
 
 from ja_common.core.config import ConfigError
 from ja_common.core.live_page import LIVE_PAGE
-from ja_common.private_executor import own_executor
+from ja_common.private_context import private_executor
 from ja_common.ros_arguments import check_ros_arguments
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_runner.companion import Companion
 from ja_runner.node_spec import NodeSpec
 from ja_runner.one_process import run_in_one_process
+from ja_runner.parts import check_installed, is_installed
 from ja_runner.progress import Display, ProgressNode
 from ja_runner.supervisor import OnDeath, Supervisor
 
@@ -54,6 +55,7 @@ def run_graph(
     """
     apply_ros_defaults()
     check_ros_arguments(arguments)
+    check_installed(spec.package for spec in graph)
     graph = [_with_memory(spec, (memory or folder).absolute()) for spec in graph]
     progress: list[ProgressNode] = []
 
@@ -64,7 +66,9 @@ def run_graph(
 
     with Display(title) as display, ExitStack() as beside:
         page: Companion | None = None
-        if view:
+        if view and not is_installed('ja_dashboard'):
+            display.print_line('there is no live page: the dashboard is not installed')
+        elif view:
             spec = NodeSpec('ja_dashboard', 'view', arguments=arguments)
             page = Companion(spec, folder / 'log', display.print_line, LIVE_PAGE)
             beside.enter_context(page)
@@ -105,7 +109,7 @@ def _run_processes(
     on_death: OnDeath,
     report: Callable[[str], None],
 ) -> int:
-    with own_executor() as executor:
+    with private_executor() as executor:
         executor.add_node(make_progress_node(executor.context))
 
         def tick() -> bool:

@@ -72,7 +72,7 @@ class NodeProcess:
             PARENT: str(os.getpid()),
         }
         with self._log.open('ab') as log, _signal_blocked(signal.SIGINT):
-            self._starts_at = log.tell()
+            self._starts_at = os.fstat(log.fileno()).st_size
             # A session of its own: Ctrl-C reaches only the supervisor, which stops all in order.
             self.popen = subprocess.Popen(
                 self.spec.command(),

@@ -24,7 +24,7 @@ class FrameConfig(Configuration):
 
 
 class DigitalHeadNode(GraphNode):
-    """For every wide picture: the head's posture, calibration and view, with its stamp."""
+    """Publishes the head's posture, calibration and view at the stamp of every wide picture."""
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('digital_head', **node_kwargs)
@@ -32,9 +32,9 @@ class DigitalHeadNode(GraphNode):
         self._frame_id = self.configure(FrameConfig).frame_id
         self._joints = JointCodec(self.configure(JointConfig))
         self._head = DigitalHead(self._config)
-        self._says_joints = self.create_topic_publisher(JOINT_STATES)
-        self._says_info = self.create_topic_publisher(CAMERA_INFO)
-        self._says_image = self.create_topic_publisher(IMAGE)
+        self._joint_publisher = self.create_topic_publisher(JOINT_STATES)
+        self._info_publisher = self.create_topic_publisher(CAMERA_INFO)
+        self._image_publisher = self.create_topic_publisher(IMAGE)
         self.subscribe(JOINT_COMMANDS, self._on_command)
         self.subscribe(WIDE_IMAGE, self._on_wide_image, expected_every_s=2.0)
 
@@ -46,12 +46,14 @@ class DigitalHeadNode(GraphNode):
     def _on_wide_image(self, message: Image) -> None:
         view, posture = self._head.render_view(decode_image(message), to_ns(message.header.stamp))
         header = Header(stamp=message.header.stamp, frame_id=self._frame_id)
-        self._says_joints.publish(
+        self._joint_publisher.publish(
             self._joints.encode_posture(header, posture.position, posture.velocity)
         )
         width, height = self._config.view_width_px, self._config.view_height_px
-        self._says_info.publish(encode_camera_info(header, width, height, self._head.focal_px))
-        self._says_image.publish(encode_image(view, header.stamp, header.frame_id))
+        self._info_publisher.publish(
+            encode_camera_info(header, width, height, self._head.focal_px)
+        )
+        self._image_publisher.publish(encode_image(view, header.stamp, header.frame_id))
 
 
 def main(args: Sequence[str] | None = None) -> None:

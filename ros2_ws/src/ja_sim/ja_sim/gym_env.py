@@ -1,14 +1,14 @@
-"""The world as a Gymnasium environment, so that others' learners can be tried on it.
+"""The world as a Gymnasium environment, for learners of other projects.
 
     import gymnasium
     env = gymnasium.make('ja_sim.gym_env:JointAttention-v0', scene='easy')
 
 (Gymnasium 1 finds no environments by itself: it imports the module before the colon. After that
-`JointAttention-v0` alone will do.)
+`JointAttention-v0` alone is enough.)
 
 An episode is one trial. It begins when the caregiver has turned to an object; each action shifts
 the head; it ends when an object stands in the centre. The reward is 1 if that is the object she
-attends to: an outside score for benchmarks. The robot of this project must learn without it.
+attends to: a score for benchmarks. The robot of this project learns without it.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class JointAttentionEnv(gymnasium.Env):
         d_th_rad: float = WIDTH_SIXTH,
         render_mode: str | None = None,
     ) -> None:
-        """``scene`` is a name or a file; ``d_th_rad`` the radius of the centre (Eq. 3)."""
+        """Build the world; ``scene``: name or file; ``d_th_rad``: radius of the centre (Eq. 3)."""
         self.render_mode = render_mode
         self._world = JointAttentionWorld(load_scene(scene), seed=0, image_size=image_size)
         self._max_shifts, self._d_th_rad = max_shifts, d_th_rad
@@ -63,7 +63,7 @@ class JointAttentionEnv(gymnasium.Env):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """Look at the caregiver and wait until she has turned; a seed begins another world."""
+        """Look at the caregiver and wait until she has turned; a seed starts another world."""
         super().reset(seed=seed)
         if seed is not None:
             self._world.reset(seed)
@@ -91,7 +91,7 @@ class JointAttentionEnv(gymnasium.Env):
         return self._observation(), reward, fixated is not None, truncated, info
 
     def render(self) -> np.ndarray | None:
-        """What the robot sees."""
+        """Return the robot's camera image (H, W, 3); None unless `render_mode` is rgb_array."""
         return self._world.observe().image if self.render_mode == 'rgb_array' else None
 
     def close(self) -> None:
@@ -115,14 +115,14 @@ class JointAttentionEnv(gymnasium.Env):
         return nearest_to_centre(rays, self._d_th_rad)
 
     def _settle(self) -> None:
-        """Let the head come to rest, whatever its servos."""
+        """Step until the head rests, with any servos."""
         for _ in range(SETTLING_STEPS):
             self._world.step(SHIFT_S)
             if np.all(np.abs(self._world.joint_state().velocity) < 0.01):
                 return
 
     def _look_away(self) -> None:
-        """Her face leaves the centre, so that the next look counts as a new one."""
+        """Turn away from her face, so that the next look counts as a new one."""
         self._world.command(np.array([0.5, 0.0]) + self._world.truth().face_direction)
         self._settle()
 
@@ -136,7 +136,7 @@ class JointAttentionEnv(gymnasium.Env):
 
 
 def register() -> None:
-    """Make the environment known to Gymnasium, once."""
+    """Register the environment with Gymnasium, once."""
     if ENV_ID not in gymnasium.registry:
         gymnasium.register(id=ENV_ID, entry_point='ja_sim.gym_env:JointAttentionEnv')
 

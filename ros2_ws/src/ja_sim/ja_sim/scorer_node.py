@@ -1,4 +1,4 @@
-"""`scorer`: joins the truth with what the robot fixated; no other node may hear the truth."""
+"""`scorer`: compares the truth with the fixations; no other node may subscribe to the truth."""
 
 import csv
 from dataclasses import dataclass
@@ -25,14 +25,14 @@ _CSV_COLUMNS = (
 
 @dataclass(frozen=True)
 class ScorerConfig(Configuration):
-    """What is reported, and where it is kept."""
+    """What is reported, and where it is stored."""
 
     window_trials: int = parameter(100, 'trials of the recent success rate', low=1, high=100000)
-    csv_file: str = parameter('', 'file that gets one row a trial; empty: none')
+    csv_file: str = parameter('', 'file for one row per trial; empty: none')
 
 
 class ScorerNode(GraphNode):
-    """Success of joint attention, after every trial."""
+    """Publishes the success of joint attention after every trial."""
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('scorer', **node_kwargs)
@@ -42,8 +42,8 @@ class ScorerNode(GraphNode):
         Synchroniser(self).call_with(
             {SIM_TRUTH: decode_truth, FIXATION: self._joints.decode}, self._score_image
         )
-        self._success_rate = self.create_topic_publisher(SUCCESS_RATE)
-        self._details = self.create_topic_publisher(SCORE)
+        self._success_rate_publisher = self.create_topic_publisher(SUCCESS_RATE)
+        self._score_publisher = self.create_topic_publisher(SCORE)
         self.advertise_service(Trigger, 'sim/reset_score', self._on_reset)
         self._csv_file = self._open_csv(self._config.csv_file)
 
@@ -64,11 +64,11 @@ class ScorerNode(GraphNode):
         return file
 
     def _score_image(self, found: StampedSet) -> None:
-        outcome = self._score.see(found[SIM_TRUTH], found[FIXATION])
+        outcome = self._score.score_image(found[SIM_TRUTH], found[FIXATION])
         if outcome is not None:
-            self._tell(outcome)
+            self._publish_score(outcome)
 
-    def _tell(self, outcome: TrialOutcome) -> None:
+    def _publish_score(self, outcome: TrialOutcome) -> None:
         if self._csv_file is not None:
             self._csv.writerow(_csv_row(outcome))
         rates = self._score.rates()
@@ -83,8 +83,8 @@ class ScorerNode(GraphNode):
         values['last'] = (
             'success' if outcome.success else 'failure' if outcome.fixated else 'given up'
         )
-        self._success_rate.publish(Float32(data=rates['recent'].rate))
-        self._details.publish(
+        self._success_rate_publisher.publish(Float32(data=rates['recent'].rate))
+        self._score_publisher.publish(
             DiagnosticStatus(
                 name=self.get_fully_qualified_name(),
                 message=f'{rates["all"].successes} of {rates["all"].trials} trials',
@@ -94,7 +94,7 @@ class ScorerNode(GraphNode):
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         self._score = Score(self._config.window_trials)
-        response.success, response.message = True, 'counting from nought'
+        response.success, response.message = True, 'counting from zero'
         return response
 
 

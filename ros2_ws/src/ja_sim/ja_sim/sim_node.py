@@ -43,10 +43,10 @@ _T = TypeVar('_T')
 
 @dataclass(frozen=True)
 class SimConfig(Configuration):
-    """Which world, and by what its time passes."""
+    """Which world is simulated, and what advances its time."""
 
     scene: str = parameter('default', 'name of a scene, or path of a scene file (YAML)')
-    seed: int = parameter(0, 'seed of everything that is drawn', low=0)
+    seed: int = parameter(0, 'seed of every random draw', low=0)
     image_width: int = parameter(320, 'columns of the image [px]', low=32, high=4096)
     image_height: int = parameter(240, 'rows of the image [px]', low=24, high=4096)
     camera_rate_hz: float = parameter(10.0, 'images a second of simulated time', low=0.1, high=1e3)
@@ -56,21 +56,24 @@ class SimConfig(Configuration):
     )
     draw_ahead: bool = parameter(
         False,
-        'in lockstep: draw the next picture while the last is judged: more images a second, and a '
-        'command moves the head one picture later, as behind a slower camera',
+        'in lockstep: draw the next picture while the robot processes the last: more images a '
+        'second, and a command moves the head one picture later, as with a slower camera',
     )
     resend_after_s: float = parameter(
-        0.5, 'in lockstep or a pause: send the last image again after so long',
+        0.5, 'in lockstep or a pause: time after which the last image is sent again',
         low=0.05, high=60.0,
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class LiveConfig(Configuration):
-    """What may change while the world runs."""
+    """Parameters that may change while the world runs."""
 
     objects: int = parameter(
-        0, 'how many objects, in a world begun anew; 0: as many as the scene says', low=0, high=10
+        0,
+        'number of objects; a change restarts the world; 0: as many as in the scene',
+        low=0,
+        high=10,
     )
     real_time_factor: float = parameter(
         0.0, 'simulated seconds a second; 0: as fast as commands come in lockstep, else 1',
@@ -90,7 +93,7 @@ class _Round:
 
 
 class SimNode(GraphNode):
-    """Publishes what camera and encoders give, and obeys `joint_commands`."""
+    """Publishes camera images and encoder readings, and follows `joint_commands`."""
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('sim', **node_kwargs)
@@ -98,9 +101,9 @@ class SimNode(GraphNode):
         self._live = self.configure(LiveConfig, self._on_live_config)
         self._joints = JointCodec(self.configure(JointConfig))
         # An OpenGL context belongs to one thread: this one makes the worlds and draws them.
-        self._render_thread, self._closed = ThreadPoolExecutor(1, 'studio'), False
-        self._world = self._in_studio(self._make_world, self._live.objects)
-        # The world's time starts at nought after a reset; the time of the graph never goes back.
+        self._render_thread, self._closed = ThreadPoolExecutor(1, 'render'), False
+        self._world = self._in_render_thread(self._make_world, self._live.objects)
+        # The world's time restarts at zero after a reset; the time of the graph never goes back.
         self._time_offset_ns = 0
         self.subscribe(JOINT_COMMANDS, self._on_command, expected_every_s=2.0)
         self._simulated_time = self.create_topic_publisher(CLOCK)
@@ -121,7 +124,7 @@ class SimNode(GraphNode):
         self._published_s = -math.inf
         self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
         self._pace = Pace(self._config.lockstep)
-        self._beats: Timer | None = None
+        self._period_timer: Timer | None = None
         self._set_speed(self._live.real_time_factor)
         self.create_timer(self._config.resend_after_s / 5, self._resend, clock=self._steady)
 
@@ -129,58 +132,61 @@ class SimNode(GraphNode):
         """Close the renderer, then the node."""
         if not self._closed:
             self._closed = True
-            self._in_studio(self._world.close)
+            self._in_render_thread(self._world.close)
             self._render_thread.shutdown()
         super().destroy_node()
 
     def _on_command(self, message: JointState) -> None:
         answers_image = message.header.stamp == self._round.image.header.stamp
         if self._config.lockstep and not answers_image:
-            return  # an answer to an image sent twice, or a hold while the sim stood still
+            return  # an answer to an image sent twice, or a hold while the sim was paused
         posture = self._joints.decode_posture(message)
         if posture is None:
             raise ValueError('a command names no joints')
         self._command, self._was_answered = posture, True
-        self._pace.answer()
-        self._go_on()
+        self._pace.record_answer()
+        self._tick_if_due()
 
-    def _on_beat(self) -> None:
-        self._pace.beat()
-        self._go_on()
+    def _on_period(self) -> None:
+        self._pace.record_period()
+        self._tick_if_due()
 
-    def _go_on(self) -> None:
+    def _tick_if_due(self) -> None:
         if self._pace.is_due:
             self._tick()
 
     def _tick(self) -> None:
         self._round = self._next_round()
-        self._pace.made()
+        self._pace.record_image()
         self._publish()
 
     def _next_round(self) -> _Round:
-        """The next one, drawn now or ahead; if ahead, the one after it is begun."""
+        """Return the next round, drawn now or ahead; if ahead, start to draw the one after it."""
         drawn = (self._drawn or self._draw()).result()
         self._drawn = self._draw() if self._ahead else None
         return drawn
 
     def _draw(self) -> Future[_Round]:
-        """Begin the next round, in which the head follows the newest command."""
+        """Start to draw the next round, in which the head follows the newest command."""
         command, self._command = self._command, None
         return self._render_thread.submit(self._advance, command)
 
-    def _in_studio(self, work: Callable[..., _T], *args: Any) -> _T:
+    def _in_render_thread(self, work: Callable[..., _T], *args: Any) -> _T:
         return self._render_thread.submit(work, *args).result()
 
     def _resend(self) -> None:
-        """In lockstep, as a message may be lost; while time stands still, so that nobody stops."""
+        """Send the last image again.
+
+        In lockstep, because a message may be lost; in a pause, so that no node reports silence.
+        """
         silent_s = time.monotonic() - self._published_s
         stands = self._config.lockstep or self._pace.paused
         if silent_s < self._config.resend_after_s or not stands:
             return
-        # While the robot starts nothing is lost; `joint_commands` says if it never comes.
+        # At start-up nothing is lost; silence on `joint_commands` is reported by itself.
         if self._was_answered and not self._pace.answered:
             text = 'no command came for the last image; sending it again'
-            self.problem('lockstep', text, Level.WARN)
+            self.report_problem('lockstep', text, Level.WARN)
         self._publish()
 
     def _advance(self, command: NDArray[np.float64] | None) -> _Round:
@@ -220,33 +226,33 @@ class SimNode(GraphNode):
         return Header(stamp=to_time(stamp_ns + self._time_offset_ns), frame_id=frame_id)
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        self._in_studio(self._world.reset, self._config.seed)
-        self._begin_anew()
+        self._in_render_thread(self._world.reset, self._config.seed)
+        self._restart()
         response.success, response.message = True, f'the world of seed {self._config.seed} again'
         return response
 
-    def _begin_anew(self) -> None:
+    def _restart(self) -> None:
         step_ns = int(NS_PER_S / self._config.camera_rate_hz)
         self._time_offset_ns = to_ns(self._round.clock.clock) + step_ns
-        # Neither a command to the world that was nor a picture of it belongs to the new one.
+        # A command to the old world, or a picture of it, does not belong to the new one.
         self._command = self._drawn = None
         self._tick()
 
     def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> Any:
-        self._pace.pause(request.data)
+        self._pace.set_paused(request.data)
         self.health.values['paused'] = str(request.data)
-        self._go_on()
+        self._tick_if_due()
         response.success, response.message = True, 'paused' if request.data else 'going on'
         return response
 
     def _on_step(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        self._pace.step()
-        self._go_on()
+        self._pace.request_step()
+        self._tick_if_due()
         response.success, response.message = True, 'one image'
         return response
 
     def _on_rearrange(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        self._in_studio(self._world.rearrange)
+        self._in_render_thread(self._world.rearrange)
         response.success, response.message = True, 'the objects have other places'
         return response
 
@@ -258,25 +264,25 @@ class SimNode(GraphNode):
         self._live = config
 
     def _set_speed(self, real_time_factor: float) -> None:
-        if self._beats is not None:
-            self.destroy_timer(self._beats)
-            self._beats = None
+        if self._period_timer is not None:
+            self.destroy_timer(self._period_timer)
+            self._period_timer = None
         factor = real_time_factor or (0.0 if self._config.lockstep else 1.0)
-        self._pace.has_beat = factor > 0.0
+        self._pace.has_timer = factor > 0.0
         if factor:
             period_s = 1 / (self._config.camera_rate_hz * factor)
-            self._beats = self.create_timer(period_s, self._on_beat, clock=self._steady)
-        self._go_on()
+            self._period_timer = self.create_timer(period_s, self._on_period, clock=self._steady)
+        self._tick_if_due()
 
     def _set_objects(self, count: int) -> None:
         try:
-            world = self._in_studio(self._make_world, count)
+            world = self._in_render_thread(self._make_world, count)
         except ConfigError as error:
-            self.problem('objects', f'the world stays as it was: {error}')
+            self.report_problem('objects', f'the world is unchanged: {error}')
             return
-        self._in_studio(self._world.close)
+        self._in_render_thread(self._world.close)
         self._world = world
-        self._begin_anew()
+        self._restart()
 
     def _make_world(self, objects: int) -> JointAttentionWorld:
         scene = load_scene(self._config.scene)

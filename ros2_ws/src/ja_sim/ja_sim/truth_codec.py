@@ -19,7 +19,7 @@ FIELDS = ('x', 'y', 'z', 'pan', 'tilt', 'attended', 'in_view', 'trial')
 
 
 def encode_truth(header: Header, truth: WorldTruth) -> PointCloud2:
-    """Position [m] and direction [rad] of every object, which is meant, and the trial's number."""
+    """Encode each object's position [m] and direction [rad], the attended one, and the trial."""
     count = len(truth.positions)
     columns = [*truth.positions.T, *truth.directions.T]
     columns.append(np.arange(count) == truth.attended)
@@ -28,7 +28,7 @@ def encode_truth(header: Header, truth: WorldTruth) -> PointCloud2:
 
 
 def decode_truth(message: PointCloud2) -> TruthAt:
-    """What the scorer needs of it. Raises ValueError when the message is something else."""
+    """Decode what the scorer needs. Raises ValueError when the message is something else."""
     columns = decode_columns(message, FIELDS)
     attended = np.flatnonzero(columns['attended'])
     if not len(columns['trial']):

@@ -1,8 +1,8 @@
 """The fast learner in the loop: its gate, its glances, and a world that changes.
 
-One life a seed, each with another caregiver and a fresh look every trial, in the geometry of the
-default scene: what the head has not seen is no candidate, and what it sees depends on whom the
-gate lets turn it.
+One run for each seed, each with another caregiver and a fresh look every trial, in the geometry of
+the default scene. Only what the head has seen is a candidate, and what it sees depends on the
+proposals that the gate chooses.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ja_benchmarks.rows import Row, success_row
 from ja_experiments.agents.trial_loop import TrialLoop
 from ja_experiments.config import ExperimentConfig
 from ja_experiments.datasets.looks import load_looks
-from ja_experiments.processes import side_by_side
+from ja_experiments.processes import run_in_processes
 from ja_learning.core.gaze_line import GazeLineLearner
 from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_sim.core.scene import load_scene
@@ -42,8 +42,8 @@ GATES: dict[str, dict[str, Any]] = {
 
 
 @dataclass(frozen=True)
-class Lived:
-    """What came of one life: success and p(LM) of every trial, and images a trial."""
+class RunOutcome:
+    """The results of one run: success and p(LM) of every trial, and images a trial."""
 
     success: np.ndarray
     p_lm: np.ndarray
@@ -51,30 +51,30 @@ class Lived:
 
     @property
     def opened(self) -> float:
-        """Trials until p(LM) was beyond a half; as many as there were if it never was."""
+        """Return the trials until p(LM) exceeded 0.5; all trials if it never did."""
         return float(np.argmax(self.p_lm > 0.5)) if (self.p_lm > 0.5).any() else len(self.p_lm)
 
 
 def run() -> dict[str, Row]:
-    """Means over seeds and their 95 % intervals."""
+    """Measure gates, ablations and changes: means over seeds with their intervals."""
     for seed in SEEDS:
         load_looks('default', seed, LOOKS)
     return _gates() | _ablation() | _changes()
 
 
-def live(settings: dict[str, Any], top_down: bool, seed: int, change: str = '') -> Lived:
-    """One life under these settings; after `BEFORE_CHANGE` trials the world may change."""
+def run_once(settings: dict[str, Any], top_down: bool, seed: int, change: str = '') -> RunOutcome:
+    """Run one seed with these settings; after `BEFORE_CHANGE` trials the world may change."""
     config = ExperimentConfig().with_settings({**_BASE, **settings})
     learner = GazeLineLearner(GazeLineConfig(top_down=top_down), seed)
     looks = load_looks('default', seed, LOOKS)
-    life = TrialLoop(config, load_scene('default').objects, looks, learner, seed)
-    before = life.run(BEFORE_CHANGE).success
+    loop = TrialLoop(config, load_scene('default').objects, looks, learner, seed)
+    before = loop.run(BEFORE_CHANGE).success
     if change == 'mirrored':
-        life.move_to(replace(looks, faces=np.ascontiguousarray(looks.faces[:, :, ::-1])))
+        loop.move_to(replace(looks, faces=np.ascontiguousarray(looks.faces[:, :, ::-1])))
     elif change == 'another caregiver':
-        life.move_to(load_looks('default', (seed + 1) % len(SEEDS), LOOKS))
-    after = life.run(TRIALS - BEFORE_CHANGE).success
-    return Lived(np.concatenate([before, after]), np.array(life.p_lm), life.images / TRIALS)
+        loop.move_to(load_looks('default', (seed + 1) % len(SEEDS), LOOKS))
+    after = loop.run(TRIALS - BEFORE_CHANGE).success
+    return RunOutcome(np.concatenate([before, after]), np.array(loop.p_lm), loop.images / TRIALS)
 
 
 def _gates() -> dict[str, Row]:
@@ -84,13 +84,13 @@ def _gates() -> dict[str, Row]:
         for gate, objects in conditions
         for seed in SEEDS
     ]
-    lives = _by_condition(side_by_side('gates', live, tasks))
+    runs = _by_condition(run_in_processes('gates', run_once, tasks))
     rows: dict[str, Row] = {}
-    for (gate, objects), found in zip(conditions, lives, strict=True):
+    for (gate, objects), found in zip(conditions, runs, strict=True):
         name = f'{objects} objects, gate: {gate}'
         rows |= _success(name, found)
         if gate == 'evidence':
-            rows[f'{name}: opened after'] = _number([life.opened for life in found], 'trials')
+            rows[f'{name}: opened after'] = _number([each.opened for each in found], 'trials')
     return rows
 
 
@@ -105,42 +105,42 @@ def _ablation() -> dict[str, Row]:
         for around, top_down in conditions
         for seed in SEEDS
     ]
-    lives = _by_condition(side_by_side('ablation', live, tasks))
+    runs = _by_condition(run_in_processes('ablation', run_once, tasks))
     rows: dict[str, Row] = {}
-    for (around, top_down), found in zip(conditions, lives, strict=True):
+    for (around, top_down), found in zip(conditions, runs, strict=True):
         name = f'look around: {around}, top-down: {"on" if top_down else "off"}'
         rows |= _success(name, found)
-        rows[f'{name}: opened after'] = _number([life.opened for life in found], 'trials')
-        rows[f'{name}: cost'] = _number([life.images_a_trial for life in found], 'images a trial')
+        rows[f'{name}: opened after'] = _number([each.opened for each in found], 'trials')
+        rows[f'{name}: cost'] = _number([each.images_a_trial for each in found], 'images a trial')
     return rows
 
 
 def _changes() -> dict[str, Row]:
     kinds = ('mirrored', 'another caregiver')
     tasks = [({'gating': 'evidence'}, True, seed, kind) for kind in kinds for seed in SEEDS]
-    lives = _by_condition(side_by_side('changes', live, tasks))
+    runs = _by_condition(run_in_processes('changes', run_once, tasks))
     rows: dict[str, Row] = {}
-    for kind, found in zip(kinds, lives, strict=True):
+    for kind, found in zip(kinds, runs, strict=True):
         at = BEFORE_CHANGE
         parts = {'50 trials before': slice(at - 50, at), 'first 50 after': slice(at, at + 50)}
         for part, trials in {**parts, 'last 50': slice(-50, None)}.items():
-            shares = [life.success[trials].mean() for life in found]
+            shares = [each.success[trials].mean() for each in found]
             rows[f'{kind} after {at}, {part}'] = success_row(shares)
-        lowest = [life.p_lm[at:].min() for life in found]
+        lowest = [each.p_lm[at:].min() for each in found]
         rows[f'{kind} after {at}, lowest p(LM)'] = _number(lowest, 'p(LM)')
     return rows
 
 
-def _success(name: str, lives: list[Lived]) -> dict[str, Row]:
+def _success(name: str, runs: list[RunOutcome]) -> dict[str, Row]:
     return {
-        f'{name}: whole life': success_row([life.success.mean() for life in lives]),
-        f'{name}: last {LAST}': success_row([life.success[-LAST:].mean() for life in lives]),
+        f'{name}: whole run': success_row([each.success.mean() for each in runs]),
+        f'{name}: last {LAST}': success_row([each.success[-LAST:].mean() for each in runs]),
     }
 
 
-def _by_condition(lives: list[Lived]) -> list[list[Lived]]:
+def _by_condition(runs: list[RunOutcome]) -> list[list[RunOutcome]]:
     count = len(SEEDS)
-    return [lives[start : start + count] for start in range(0, len(lives), count)]
+    return [runs[start : start + count] for start in range(0, len(runs), count)]
 
 
 def _number(values: list[float], unit: str) -> Row:

@@ -1,4 +1,4 @@
-"""The whole graph in front of the sim: steps and trials a second, latency per hop, start-up."""
+"""The whole graph with the sim: images and trials a second, latency per hop, start-up."""
 
 import time
 from collections import defaultdict
@@ -26,7 +26,7 @@ HOPS = (DETECTIONS, VF_DELTA, LM_DELTA, FIXATION, JOINT_COMMANDS)
 
 
 def run() -> dict[str, Row]:
-    """Lockstep in both compositions, then real time at the camera's rate for the latencies."""
+    """Run in lockstep in both compositions, then in real time for the latencies."""
     rows: dict[str, Row] = {}
     for name, one_process in (('many processes', False), ('one process', True)):
         rates = lockstep_rates(sim_graph(), one_process)
@@ -35,15 +35,16 @@ def run() -> dict[str, Row]:
 
 
 def lockstep_rates(graph: Sequence[NodeSpec], one_process: bool) -> dict[str, Row]:
-    """Image steps and trials a second of a graph, and the time to its first command.
+    """Measure image steps and trials a second of a graph, and the time to its first command.
 
-    Also the processor time of this process for an image: what the graph costs if it is all here.
+    Also measure the processor time of this process for an image, which is that of the whole graph
+    if the graph runs in one process.
     """
     return _RateMeter(graph, one_process).rates()
 
 
 class _RateMeter:
-    """One lockstep run, and the times at which images and trials were finished."""
+    """One lockstep run, with the times at which images and trials were finished."""
 
     def __init__(self, graph: Sequence[NodeSpec], one_process: bool) -> None:
         self._began_s = time.monotonic()
@@ -60,7 +61,7 @@ class _RateMeter:
         return node.elapsed_s > WARM_UP_S + MEASURE_S
 
     def rates(self) -> dict[str, Row]:
-        """Rates over blocks of time after the warm-up, and the time to the first answer."""
+        """Return rates over blocks of time after the warm-up, and the start-up time."""
         times, busy, images, trials = np.array(self._images).T
         warm = times > self._first_image_s + WARM_UP_S
         times, busy, images, trials = times[warm], busy[warm], images[warm], trials[warm]
@@ -83,26 +84,28 @@ class _RateMeter:
 
 
 class _DelayMeter:
-    """When the messages of each image arrived at one and the same listener."""
+    """The times at which the messages of each image arrived at one subscriber."""
 
     def __init__(self) -> None:
         self._arrived_s: dict[int, dict[str, float]] = defaultdict(dict)
-        self._hearing = False
+        self._subscribed = False
 
     def tick(self, node: ProgressNode) -> bool:
-        if not self._hearing:
-            self._hearing = True
+        """Subscribe at the first call; return True when the measurement is over."""
+        if not self._subscribed:
+            self._subscribed = True
             for topic in (IMAGE, *HOPS):
-                node.subscribe(topic, self._noter(topic.name))
+                node.subscribe(topic, self._make_callback(topic.name))
         return node.elapsed_s > WARM_UP_S + MEASURE_S
 
-    def _noter(self, name: str) -> Callable[[Any], None]:
+    def _make_callback(self, name: str) -> Callable[[Any], None]:
         def note(message: Any) -> None:
             self._arrived_s[to_ns(message.header.stamp)].setdefault(name, time.monotonic())
 
         return note
 
     def rows(self) -> dict[str, Row]:
+        """Return the delays from the image to each topic."""
         rows: dict[str, Row] = {}
         rounds = [r for r in self._arrived_s.values() if len(r) == len(HOPS) + 1]
         for topic in HOPS:

@@ -1,13 +1,15 @@
 """Does learning make proposals late? Image in to delta out of a learner at work, over real topics.
 
-The learning module runs in a process of its own at 30 images/s; this process plays the camera, the
-detector and the evaluator, and holds the watch: from the detections' publication to the delta's
-arrival, both journeys included. Every five images are a trial of a random face, which is learned;
-every ten trials a checkpoint is written. Once more with `realtime_priority`, where it is allowed.
+The learning module runs in its own process at 30 images/s. This process publishes what camera,
+detector and evaluator would, and measures the time from the publication of the detections to the
+arrival of the delta, with both transports. Every five images are a trial of a random face, from
+which the learner is trained; every ten trials a checkpoint is written. All is measured again with
+`realtime_priority`, where that is allowed.
 
-The watch goes before all ordinary programs, the learner among them, where it may: how late it is
-itself on a busy machine is not to be measured. A program that only burned 60 ms of processor time
-six times a second took the 99th percentile of a learner at rest from 3.0 to 4.0 - 6.4 ms.
+Where it may, this process runs with a higher priority than all ordinary programs, and than the
+learner, so that its own delay on a busy machine is not measured. A program that only used 60 ms of
+processor time six times a second raised the 99th percentile of a learner at rest from 3.0 to
+4.0 - 6.4 ms.
 """
 
 import sys
@@ -31,8 +33,8 @@ from ja_common.detection_codec import encode_detections
 from ja_common.graph_node import GraphNode
 from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
-from ja_common.private_executor import own_executor
-from ja_common.realtime import enable_realtime_scheduling, go_back_among_all
+from ja_common.private_context import private_executor
+from ja_common.realtime import enable_realtime_scheduling, restore_scheduling
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_common.status_values import status_values
 from ja_common.time_codec import to_ns, to_time
@@ -47,7 +49,7 @@ OBJECTS = 5
 PATIENCE_S = 5.0
 # Above that of the learner in some of the conditions.
 WATCH_PRIORITY = 2
-# So many that a lesson lasts longer than a trial.
+# So many that an update takes longer than a trial.
 MANY_STEPS = 12
 CONDITIONS: dict[str, dict[str, Any]] = {
     'not learning': {'learning_enabled_at_start': False},
@@ -59,14 +61,14 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 
 
 def run() -> dict[str, Row]:
-    """The fast learner, while it does not learn, as configured by default, and at work always."""
+    """Measure the fast learner: not learning, with its defaults, and always learning."""
     apply_ros_defaults()
     rows: dict[str, Row] = {}
     for name, parameters in CONDITIONS.items():
         try:
             watch = _measure(parameters)
-        finally:  # the next learner, and the next benchmark, start as any program
-            go_back_among_all()
+        finally:  # the next learner and the next benchmark start with default scheduling
+            restore_scheduling()
         if watch.priority.startswith('none'):
             print(f'{name}: not measured: {watch.priority}', file=sys.stderr)
             continue
@@ -82,14 +84,14 @@ def run() -> dict[str, Row]:
 
 
 def _measure(parameters: dict[str, Any]) -> '_LearnerProbe':
-    with own_executor() as executor, TemporaryDirectory() as folder:
+    with private_executor() as executor, TemporaryDirectory() as folder:
         watch = _LearnerProbe(context=executor.context)
         executor.add_node(watch)
-        story = watch.story()
+        steps = watch.steps()
 
         def tick() -> bool:
             executor.spin_once(timeout_sec=0.005)
-            return next(story, 'over') == 'over'
+            return next(steps, 'over') == 'over'
 
         kept = {'learner': 'gaze_line', 'checkpoint_folder': f'{folder}/checkpoints'}
         learner = NodeSpec('ja_learning', 'learning_module', {**kept, **parameters})
@@ -99,14 +101,14 @@ def _measure(parameters: dict[str, Any]) -> '_LearnerProbe':
 
 
 class _LearnerProbe(GraphNode):
-    """Plays all that the learner hears, image after image, and times its answers."""
+    """A node that publishes the learner's inputs, image by image, and times its answers."""
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('watch', **node_kwargs)
         self._random = np.random.default_rng(0)
         self._joints = JointCodec(JointConfig())
-        said = (JOINT_STATES, FACE_IMAGE, DETECTIONS, FIXATION)
-        self._say = {topic: self.create_topic_publisher(topic) for topic in said}
+        inputs = (JOINT_STATES, FACE_IMAGE, DETECTIONS, FIXATION)
+        self._publishers_of = {topic: self.create_topic_publisher(topic) for topic in inputs}
         self._answered: tuple[int, float] = (0, 0.0)
         self.delays_ms: list[float] = []
         self.trials = self.waiting = 0
@@ -114,45 +116,50 @@ class _LearnerProbe(GraphNode):
         self.subscribe(LM_DELTA, self._on_delta)
         self.subscribe(DIAGNOSTICS, self._on_diagnostics)
 
-    def story(self) -> Iterator[str]:
-        """The measurement in steps; the caller spins between them."""
-        while not all(each.get_subscription_count() for each in self._say.values()):
+    def steps(self) -> Iterator[str]:
+        """Run the measurement in steps; the caller spins between them."""
+        while not all(each.get_subscription_count() for each in self._publishers_of.values()):
             yield 'waiting for the learner'
-        _go_before_the_learner()
+        _raise_priority()
         due_s = time.monotonic()
         for number in range(WARM_UP_IMAGES + IMAGES):
             while time.monotonic() < due_s:
                 yield 'waiting for the time of the next image'
             stamp_ns = int((number + 1) / RATE_HZ * NS_PER_S)
-            began_s = self._show(number, Header(stamp=to_time(stamp_ns)))
+            began_s = self._publish_image(number, Header(stamp=to_time(stamp_ns)))
             late_s = time.monotonic() + PATIENCE_S
             while self._answered[0] != stamp_ns:
                 if time.monotonic() > late_s:
                     raise ConfigError(f'no answer of the learner within {PATIENCE_S:g} s')
                 yield 'waiting for the answer'
             self.delays_ms.append(1e3 * (self._answered[1] - began_s))
-            self._judge(number, Header(stamp=to_time(stamp_ns)))
+            self._publish_fixation(number, Header(stamp=to_time(stamp_ns)))
             due_s = max(due_s + 1.0 / RATE_HZ, time.monotonic())
 
-    def _show(self, number: int, header: Header) -> float:
-        """An image of the trial: the first is a look, then the head has shifted. When said [s]."""
+    def _publish_image(self, number: int, header: Header) -> float:
+        """Publish the results of one image; return when the detections were published [s].
+
+        The first image of a trial is a look at the face; then the head has shifted.
+        """
         looks = number % IMAGES_A_TRIAL == 0
         posture = np.zeros(2) if looks else np.array([0.2, 0.0])
-        self._say[JOINT_STATES].publish(self._joints.encode_posture(header, posture, np.zeros(2)))
+        self._publishers_of[JOINT_STATES].publish(
+            self._joints.encode_posture(header, posture, np.zeros(2))
+        )
         seen = [_detection(Kind.OBJECT, ray) for ray in self._rays()]
         if looks:
             face = self._random.integers(0, 256, (30, 25)).astype(np.uint8)
-            self._say[FACE_IMAGE].publish(encode_image(face, header.stamp, ''))
+            self._publishers_of[FACE_IMAGE].publish(encode_image(face, header.stamp, ''))
             seen.append(_detection(Kind.FACE, np.zeros(2)))
         detections = encode_detections(header, seen)
         began_s = time.perf_counter()
-        self._say[DETECTIONS].publish(detections)
+        self._publishers_of[DETECTIONS].publish(detections)
         return began_s
 
-    def _judge(self, number: int, header: Header) -> None:
+    def _publish_fixation(self, number: int, header: Header) -> None:
         ends = number % IMAGES_A_TRIAL == IMAGES_A_TRIAL - 1
         direction = np.array([0.2, 0.0]) if ends else None
-        self._say[FIXATION].publish(self._joints.encode(header, direction))
+        self._publishers_of[FIXATION].publish(self._joints.encode(header, direction))
 
     def _rays(self) -> NDArray[np.float64]:
         return self._random.uniform(-0.3, 0.3, (OBJECTS, 2))
@@ -168,11 +175,11 @@ class _LearnerProbe(GraphNode):
             self.priority = values.get('real-time priority', self.priority)
 
 
-def _go_before_the_learner() -> None:
+def _raise_priority() -> None:
     try:
         enable_realtime_scheduling(WATCH_PRIORITY)
     except OSError as error:
-        print(f'how late the watch is itself is measured too: {error}', file=sys.stderr)
+        print(f'the delay of this process is measured too: {error}', file=sys.stderr)
 
 
 def _detection(kind: Kind, ray: NDArray[np.float64]) -> Detection:

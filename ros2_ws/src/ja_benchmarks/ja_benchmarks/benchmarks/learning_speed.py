@@ -1,13 +1,13 @@
 """How many trials until a learner knows what she looks at? The fast learner beside the paper's.
 
-A fresh look every trial, each seed another caregiver; everything that was seen is a candidate, and
-the learner alone chooses among the objects of 500 looks that it never learned from, each of them
-four times, with other objects beside the one that was meant. The paper's network learns from the
-object that it happened to fixate, drawn among all that were seen, as in its first stage; of its
-proposal the nearest object is taken. Ceilings stand beside them: those of `./ja bench world`, for
-whoever sees exactly where her eyes point, or her head alone, and what the fast learner reaches if
-it is told what she means, which no robot is: the most that its networks get from as many pictures
-of her face.
+Each trial has a fresh look, each seed another caregiver, and every object that was seen is a
+candidate. In the test the learner alone chooses among the objects of 500 looks that it never
+learned from. Each look is asked four times, with other objects beside the attended object. The
+paper's network learns from the object that it happened to fixate, drawn among all that were seen,
+as in its first stage; the object nearest to its proposal is taken. The ceilings are those of
+`./ja bench world`, for an observer that knows the exact direction of her eyes, or of her head. A
+third ceiling is the fast learner with the attended object as its label, which no robot has: the
+most that its networks learn from as many pictures of her face.
 """
 
 from __future__ import annotations
@@ -20,19 +20,17 @@ from numpy.typing import NDArray
 from ja_benchmarks.ceiling import ceiling
 from ja_benchmarks.rows import Row, success_row
 from ja_experiments.datasets.looks import POOL, Looks, load_looks
-from ja_experiments.processes import side_by_side
+from ja_experiments.processes import run_in_processes
 from ja_learning.core.gaze_line import GazeLineLearner
-from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_learning.core.learner import Predictor
-from ja_learning.core.learner_registry import LearnerChoice, make_learner
+from ja_learning.core.learner_registry import make_learner
 from ja_learning.core.network import ThreeLayerNetwork
-from ja_learning.core.network_config import NetworkConfig
 from ja_learning.core.trial import Trial
 
 SEEDS = range(10)
 TRIALS = 2000
 TEST_LOOKS = 500
-# Each look is asked about so often, among other objects: chance weighs less in the figures.
+# Each look is asked so often, among other objects, to reduce the influence of chance.
 ARRANGEMENTS = 4
 LOOKS = TRIALS + TEST_LOOKS
 LOOKS_IN_ANOTHER_ROOM = 100 + TEST_LOOKS
@@ -43,10 +41,11 @@ _FROM_FACE_RAD, _APART_RAD = np.radians([8.0, 5.0])
 
 @dataclass(frozen=True)
 class LearningTask:
-    """What is asked. `pool`: learn from so many looks only, and be tested on them; 0: fresh ones.
+    """A condition. `pool`: learn from so many looks, and be tested on them; 0: fresh looks.
 
-    `marks`: after which trials. `change_at`: after so many trials she is another caregiver, or
-    sits in `another_room` (a scene); 0: never. `told`: what she means is the only candidate.
+    `marks`: the trials after which success is measured. `change_at`: after so many trials she is
+    another caregiver, or sits in `another_room` (a scene); 0: never. `labelled`: the attended
+    object is the only candidate.
     """
 
     name: str
@@ -56,7 +55,7 @@ class LearningTask:
     pool: int = 0
     change_at: int = 0
     another_room: str = ''
-    told: bool = False
+    labelled: bool = False
 
 
 CONDITIONS = (
@@ -70,13 +69,13 @@ CONDITIONS = (
         '5 objects, another room after 400', 5, (400, 401, 425, 450),
         change_at=400, another_room='bare_room',
     ),
-    LearningTask('10 objects, told which', 10, (200, 600, 2000), told=True),
+    LearningTask('10 objects, with labels', 10, (200, 600, 2000), labelled=True),
 )  # fmt: skip
 KINDS = (GazeLineLearner.kind, ThreeLayerNetwork.kind)
 
 
 def run() -> dict[str, Row]:
-    """Success of the learner alone after so many trials: mean over seeds and its 95 % interval."""
+    """Measure the success of the learner alone: means over seeds with their 95 % intervals."""
     for seed in SEEDS:
         load_looks('default', seed, LOOKS)
         for condition in CONDITIONS:
@@ -85,11 +84,11 @@ def run() -> dict[str, Row]:
         (kind, condition)
         for condition in CONDITIONS
         for kind in KINDS
-        # The paper's network has no candidates to be told from.
-        if kind == GazeLineLearner.kind or not condition.told
+        # The paper's network chooses among no candidates, so it has no labelled condition.
+        if kind == GazeLineLearner.kind or not condition.labelled
     ]
     tasks = [(kind, condition, seed) for kind, condition in asked for seed in SEEDS]
-    found = dict(zip(tasks, side_by_side('learning', curve, tasks), strict=True))
+    found = dict(zip(tasks, run_in_processes('learning', curve, tasks), strict=True))
     rows: dict[str, Row] = {}
     for kind, condition in asked:
         curves = np.array([found[kind, condition, seed] for seed in SEEDS])
@@ -99,15 +98,15 @@ def run() -> dict[str, Row]:
 
 
 def curve(kind: str, condition: LearningTask, seed: int) -> list[float]:
-    """Success of one learner alone, 0-1, after each of the marks."""
+    """Return the success of one learner alone, 0-1, after each of the marks."""
     rng = np.random.default_rng([seed, condition.objects])
     looks = load_looks('default', seed, LOOKS)
     elsewhere = _looks_elsewhere(condition, seed)
-    learner = make_learner(LearnerChoice(kind), NetworkConfig(), GazeLineConfig(), seed)
+    learner = make_learner(kind, seed)
     found = []
     for trial in range(1, max(condition.marks) + 1):
         world = elsewhere if elsewhere and trial > condition.change_at else looks
-        learner.learn(_trial(rng, world, trial, condition))
+        learner.update(_trial(rng, world, trial, condition))
         if trial in condition.marks:
             tested = world[: condition.pool] if condition.pool else world[-TEST_LOOKS:]
             found.append(success(learner.snapshot(), tested, condition.objects, seed))
@@ -115,7 +114,7 @@ def curve(kind: str, condition: LearningTask, seed: int) -> list[float]:
 
 
 def _looks_elsewhere(condition: LearningTask, seed: int) -> Looks | None:
-    """What is seen after the change: of another caregiver, or of the same in another room."""
+    """Return the looks after the change: another caregiver, or the same in another room."""
     if not condition.change_at:
         return None
     if condition.another_room:
@@ -124,14 +123,14 @@ def _looks_elsewhere(condition: LearningTask, seed: int) -> Looks | None:
 
 
 def success(learner: Predictor, looks: Looks, objects: int, seed: int) -> float:
-    """How often the learner alone chooses the object that was meant, 0-1."""
+    """Return how often the learner alone chooses the attended object, 0-1."""
     rng = np.random.default_rng([seed, objects, 1])
     right = []
-    for face, face_at, posture, meant in zip(
+    for face, face_at, posture, attended in zip(
         looks.faces, looks.faces_at, looks.postures, looks.directions, strict=True
     ):
         for _ in range(ARRANGEMENTS):
-            places = _places(rng, meant - posture, objects)
+            places = _places(rng, attended - posture, objects)
             delta = learner.propose(face, face_at, posture, posture + places)
             right.append(np.argmin(np.hypot(*(places - delta).T)) == 0)
     return float(np.mean(right))
@@ -141,22 +140,22 @@ def _trial(rng: np.random.Generator, looks: Looks, trial: int, condition: Learni
     fresh = (trial - 1 - condition.change_at) % (len(looks) - TEST_LOOKS)
     look = int(rng.integers(condition.pool)) if condition.pool else fresh
     posture = looks.postures[look]
-    meant = looks.directions[look] - posture
+    attended = looks.directions[look] - posture
     if rng.random() >= condition.reliability:
-        meant = _place(rng, [])
-    places = posture + _places(rng, meant, condition.objects)
+        attended = _place(rng, [])
+    places = posture + _places(rng, attended, condition.objects)
     fixated = places[rng.integers(condition.objects)]
-    shown = places[:1] if condition.told else rng.permutation(places)
+    shown = places[:1] if condition.labelled else rng.permutation(places)
     return Trial(
         looks.faces[look], looks.faces_at[look], posture[None], fixated, shown, len(shown)
     )
 
 
 def _places(
-    rng: np.random.Generator, meant: NDArray[np.float64], objects: int
+    rng: np.random.Generator, attended: NDArray[np.float64], objects: int
 ) -> NDArray[np.float64]:
-    """Displacements (objects, 2) [rad] from the look, that of what she means first."""
-    places = [meant]
+    """Draw displacements (objects, 2) [rad] from the look, that of the attended object first."""
+    places = [attended]
     while len(places) < objects:
         places.append(_place(rng, places))
     return np.array(places)

@@ -1,9 +1,9 @@
 """How fast the paper's experiment runs: the kernel, and a plain PyTorch loop, in one run.
 
-The plain loop is the readable experiment, one image and one optimiser step at a time. Since it
-spends time on more than the network, what its calls of PyTorch alone would allow is given as well:
-no loop of single steps can be faster than that. Processor time tells what a machine that is busy
-with other things would do if it were not.
+The plain loop is the readable experiment, one image and one optimiser step at a time. It spends
+time on more than the network, so the speed of its PyTorch calls alone is given as well: no loop of
+single steps can be faster than that. Processor time shows the speed on a machine without other
+work.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ _WARM_UP_TRIALS = 100
 
 
 def run() -> dict[str, Row]:
-    """Speed of both, and the time of the whole of Figure 6, for each reading."""
+    """Measure the speed of both, and the time of the whole of Figure 6, for each reading."""
     torch.set_num_threads(1)
-    materials = Materials.of(load_looks(), load_scene('default').objects)
+    materials = Materials.from_looks(load_looks(), load_scene('default').objects)
     compile_kernel(materials)
     rows: dict[str, Row] = {}
     for name in READINGS:
@@ -56,12 +56,12 @@ def _speed(name: str, materials: Materials) -> dict[str, Row]:
 
 
 def _plain_speed(name: str, materials: Materials) -> tuple[np.ndarray, np.ndarray]:
-    """Trials/s of the readable experiment, and of its calls of PyTorch, once a repetition."""
+    """Measure trials/s of the readable experiment and of its PyTorch calls, by repetition."""
     config = reading(name).with_settings({'objects': FEATURED_OBJECTS})
     experiment = ReferenceExperiment(config, materials.places, materials.pool, seed=0)
     network, in_torch = experiment.network, _FunctionTimer()
     network.predict = in_torch.around(network.predict)  # type: ignore[method-assign]
-    network.learn = in_torch.around(network.learn)  # type: ignore[method-assign]
+    network.update = in_torch.around(network.update)  # type: ignore[method-assign]
     experiment.run(_WARM_UP_TRIALS)
     plain, torch_only = [], []
     for _ in range(_REPETITIONS):
@@ -74,7 +74,7 @@ def _plain_speed(name: str, materials: Materials) -> tuple[np.ndarray, np.ndarra
 
 
 def _figure_6(name: str, materials: Materials) -> tuple[float, float, int]:
-    """All object counts and seeds, tests on the way included: time, processor time [s], trials."""
+    """Run all object counts and seeds, with tests; return time, processor time [s], trials."""
     plan = Plan()
     configs = {str(n): reading(name).with_settings({'objects': n}) for n in OBJECTS}
     start, processor_start = time.perf_counter(), time.process_time()
@@ -84,12 +84,14 @@ def _figure_6(name: str, materials: Materials) -> tuple[float, float, int]:
 
 
 class _FunctionTimer:
-    """Adds up the time spent in functions."""
+    """The total time spent in functions."""
 
     def __init__(self) -> None:
         self.seconds = 0.0
 
     def around(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Return the function with its time added to `seconds`."""
+
         def timed(*args: Any) -> Any:
             start = time.perf_counter()
             result = function(*args)

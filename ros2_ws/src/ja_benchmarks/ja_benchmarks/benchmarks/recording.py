@@ -1,4 +1,4 @@
-"""What a recorder costs the graph, and what it catches: lockstep runs with and without it."""
+"""The cost of a recorder, and the share that it records: lockstep runs with and without it."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +20,7 @@ WARM_UP_S = 3.0
 
 
 def run() -> dict[str, Row]:
-    """Runs in turn, so that a machine that slows down slows both."""
+    """Alternate runs with and without it, so that a machine that slows down slows both."""
     rates: dict[bool, list[float]] = {False: [], True: []}
     shares: list[float] = []
     for _ in range(REPEATS):
@@ -53,10 +53,10 @@ def _measure(recorded: bool) -> tuple[float, list[float]]:
         if code or not warm:
             raise ConfigError('the graph did not run to the end of the measurement')
         images, seconds = watcher.images - warm[0][0], watcher.elapsed_s - warm[0][1]
-        return images / seconds, [_caught(target, watcher.images)] if recorded else []
+        return images / seconds, [_recorded_share(target, watcher.images)] if recorded else []
 
 
-def _caught(folder: Path, answered: int) -> float:
-    """Share of the images that the gate has answered of which the recording holds the answer."""
+def _recorded_share(folder: Path, answered: int) -> float:
+    """Return the share of the images answered by the gate whose answer is in the recording."""
     answers = Recording(folder).messages({f'/{GATE_STATUS.name}'})
     return sum(1 for _ in answers) / answered

@@ -1,11 +1,11 @@
-"""What the middleware costs: the whole graph in lockstep against its parts without ROS.
+"""The cost of the middleware: the whole graph in lockstep against its parts without ROS.
 
 At 320x240 in the default scene, with the paper's learner. The parts are the cores of the nodes,
-called one after the other in one thread, measured before and after each graph since a machine has
-other work as well. Rates are of wall time. With `draw_ahead` of the sim one picture is drawn while
-the last is judged, so that the graph may be quicker than its parts one by one. What the middleware
-takes shows best in processor time, which other work disturbs less: of the graph in one process,
-against that of the parts.
+called one after the other in one thread. They are measured before and after each graph, because a
+machine has other work as well. Rates are of wall time. With `draw_ahead` the sim draws a picture
+while the nodes process the last one, so the graph may be faster than its parts one by one. The
+cost of the middleware shows best in processor time, which other work disturbs less: that of the
+graph in one process, against that of the parts.
 """
 
 import time
@@ -43,7 +43,7 @@ PARTS = ('world', 'detector', 'controller, learner, evaluator and gate')
 
 
 def run() -> dict[str, Row]:
-    """The parts, the graph in one process and in many, and the shares."""
+    """Measure the parts, the graph in one process and in many, and the ratios."""
     parts, graphs = [_parts()], {}
     for name, (one_process, ahead) in COMPOSITIONS.items():
         size = {'image_width': SIZE[0], 'image_height': SIZE[1]}
@@ -71,7 +71,7 @@ def run() -> dict[str, Row]:
 
 
 def _parts() -> NDArray[np.float64]:
-    """Wall and processor time [s] of each part for each image, shape (2, IMAGES, 3)."""
+    """Measure wall and processor time [s] of each part for each image, (2, IMAGES, 3)."""
     dwell_s = preset(CONFIG / 'demo.yaml', 'gate')['dwell_s']
     config = ExperimentConfig().with_settings({'dwell_s': dwell_s})
     robot = Robot(config, ThreeLayerNetwork(config.network, 0), np.random.default_rng(0))
@@ -105,7 +105,7 @@ def _rate(seconds: NDArray[np.float64], axis: int = -1) -> Any:
 
 
 def _ratio(one: Row, other: Row) -> Row:
-    """Of two figures; their relative errors add up in squares."""
+    """Return the ratio of two figures; their relative errors add in quadrature."""
     value = one['value'] / other['value']
     half = value * np.hypot(_relative_half(one), _relative_half(other))
     return {

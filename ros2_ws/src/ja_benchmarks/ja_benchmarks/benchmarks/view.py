@@ -1,4 +1,4 @@
-"""What a viewer of the live page costs: images a second with and without one, in one run."""
+"""The cost of a viewer of the live page: images a second with and without one, in one run."""
 
 import threading
 import time
@@ -26,7 +26,7 @@ PICTURE_EVERY_S = 0.1
 
 
 def run() -> dict[str, Row]:
-    """Blocks with and without a viewer by turns, so that other load meets both alike."""
+    """Alternate blocks with and without a viewer, so that other load affects both equally."""
     with TemporaryDirectory() as name:
         folder = Path(name)
         announcements: list[str] = []
@@ -88,7 +88,7 @@ class _Blocks:
 
 
 class _Viewer(threading.Thread):
-    """Asks for the picture as a browser does, the next one when the last one has come."""
+    """A thread that fetches pictures as a browser does, one after the other."""
 
     def __init__(self, address: str) -> None:
         super().__init__(name='viewer', daemon=True)
@@ -105,7 +105,7 @@ class _Viewer(threading.Thread):
                 continue  # before the first picture
 
     def stop(self) -> int:
-        """End; how many pictures have come."""
+        """Stop, and return the number of pictures received."""
         self._stopped.set()
         self.join()
         return self._pictures

@@ -1,4 +1,4 @@
-"""How fast and how credible the simulated world is: pictures a second, faces, and the ceiling.
+"""The speed and the realism of the simulated world: pictures a second, faces, the ceiling.
 
 Rows are ``{'value', 'unit', 'n', 'interval'}`` with a 95 % interval.
 """
@@ -30,16 +30,16 @@ PENALTIES = (0.1, 0.3, 1.0, 3.0, 10.0)
 
 
 def run() -> dict[str, Row]:
-    """All figures of the world."""
+    """Measure all figures of the world."""
     return speed() | detection() | head_pose() | ceiling()
 
 
 def speed(pictures: int = 200) -> dict[str, Row]:
-    """Pictures a second of the furnished room, and what 0.1 s of physics cost."""
+    """Measure pictures a second of the furnished room, and the time of 0.1 s of physics."""
     rows = {}
     for size in SIZES:
         world = JointAttentionWorld(load_scene('default'), seed=0, image_size=size)
-        times = _times(world.picture, pictures)
+        times = _times(world.render_picture, pictures)
         rows[f'pictures at {size[0]}x{size[1]}'] = _rate(times, '1/s')
         world.close()
     for preset in HEAD_PRESETS:
@@ -51,7 +51,7 @@ def speed(pictures: int = 200) -> dict[str, Row]:
 
 
 def detection(seeds: int = 2) -> dict[str, Row]:
-    """Share of turned faces that each detector finds, over all people, lights and both sides."""
+    """Measure the share of turned faces that each detector finds, over people, lights, sides."""
     rows = {}
     for size in SIZES[:2]:
         for name, find in DETECTORS.items():
@@ -65,10 +65,10 @@ def detection(seeds: int = 2) -> dict[str, Row]:
 
 
 def head_pose(looks_per_person: int = 250) -> dict[str, Row]:
-    """Error of a linear ridge from 30x25 crops to her head's yaw and pitch.
+    """Measure the error of a linear ridge from 30x25 crops to her head's yaw and pitch.
 
-    Every fifth look is for the test: with everybody's looks in one ridge, and with a ridge for
-    each person. The hardest split tests on people who were never seen before.
+    Every fifth look is for the test: with one ridge for all people, and with a ridge for each
+    person. The hardest split tests on people that no ridge was fitted to.
     """
     crops, angles, people = _pool(looks_per_person)
     fresh = np.arange(len(crops)) % 5 == 0
@@ -91,7 +91,7 @@ def head_pose(looks_per_person: int = 250) -> dict[str, Row]:
 
 
 def looks(world: JointAttentionWorld, count: int) -> Iterator[np.ndarray]:
-    """Look at her again and again; yield a picture of each gaze once she has turned."""
+    """Look at her repeatedly; yield a picture of each gaze once she has turned."""
     spec = world.scene.caregiver
     straight, away = np.radians([spec.pan_deg, spec.tilt_deg]), np.radians([30.0, 10.0])
     turned_s = spec.reaction_s + spec.turn_s + 0.05
@@ -107,7 +107,7 @@ def looks(world: JointAttentionWorld, count: int) -> Iterator[np.ndarray]:
 
 
 def _pool(looks_per_person: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Crops (N, 750) in 0..1, head yaw and pitch (N, 2) [deg] and number of the person (N,)."""
+    """Return crops (N, 750) in 0..1, yaw and pitch (N, 2) [deg], number of the person (N,)."""
     crops, angles, people = [], [], []
     for person, name in enumerate(identities()):
         world = JointAttentionWorld(_of_person(name), seed=person)
@@ -122,7 +122,7 @@ def _pool(looks_per_person: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _ridge_errors(crops: np.ndarray, angles: np.ndarray, test: np.ndarray) -> np.ndarray:
-    """Absolute errors (N, 2) [deg]; the penalty is chosen within the training looks."""
+    """Return absolute errors (N, 2) [deg]; the penalty is chosen within the training looks."""
     train, truth = crops[~test], angles[~test]
     held_out = np.arange(len(train)) % 5 == 0
     penalty = min(
@@ -142,14 +142,14 @@ def _ridge(x: np.ndarray, y: np.ndarray, fresh: np.ndarray, penalty: float) -> n
 
 
 def blazeface(image: np.ndarray) -> list[Box]:
-    """Faces that BlazeFace short range finds in a look at the whole picture, best first."""
+    """Return faces that BlazeFace short range finds in the whole picture, best first."""
     height, width = image.shape[:2]
     square = Box((width - 1) / 2.0, (height - 1) / 2.0, width, width)
     return [face.box for face in _blazeface().find_faces(image, square)]
 
 
 def haar(image: np.ndarray) -> list[Box]:
-    """Faces that the Haar cascades find: frontal, then both profiles."""
+    """Return faces that the Haar cascades find: frontal, then both profiles."""
     grey = cv2.equalizeHist(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
     # Their smallest window is 20 px.
     scale = 360.0 / grey.shape[0]
@@ -166,7 +166,7 @@ def haar(image: np.ndarray) -> list[Box]:
 
 
 def centerface(image: np.ndarray) -> list[Box]:
-    """Faces that CenterFace finds."""
+    """Return faces that CenterFace finds."""
     return _centerface().find(image)
 
 
@@ -200,12 +200,14 @@ def _turned_faces(size: tuple[int, int], turn_deg: float, seeds: int) -> Iterato
         for seed in range(seeds):
             world.reset(seed)
             for side in (1, -1):
-                yield world.picture(head=np.radians([side * turn_deg, 5.0]), eyes_closed=False)
+                yield world.render_picture(
+                    head=np.radians([side * turn_deg, 5.0]), eyes_closed=False
+                )
         world.close()
 
 
 def _is_face(boxes: list[Box], picture: np.ndarray) -> bool:
-    """Is the first box, or any, where her face is: the middle of the picture?"""
+    """Return True if any box is where her face is, in the middle of the picture."""
     height, width = picture.shape[:2]
     return any(
         abs(box.u - width / 2.0) < width / 8.0
@@ -227,9 +229,9 @@ def _on_head(preset: str) -> Scene:
 
 
 def _times(call: Callable[[], object], count: int) -> np.ndarray:
-    """Processor time [s] of each call, after one that does not count.
+    """Measure the processor time [s] of each call, after one that does not count.
 
-    All threads are added up, so that a rate from it is that of one core, whatever else runs.
+    The times of all threads are added, so that a rate is that of one core.
     """
     call()
     stamps = [time.process_time()]

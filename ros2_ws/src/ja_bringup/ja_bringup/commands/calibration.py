@@ -16,13 +16,13 @@ def calibrate(
     context: typer.Context,
     to: Annotated[Path, typer.Option(help='The YAML file to write.')] = Path('calibration.yaml'),
     patience_s: Annotated[
-        float, typer.Option(min=5.0, help='Give up when for so long nothing goes on.')
+        float, typer.Option(min=5.0, help='Give up after so many seconds without progress.')
     ] = 30.0,
 ) -> None:
     """Find focal length, signs, gain, play and camera delay by small turns of the head.
 
-    The head moves by 0.1 rad each way, slowly, within the limits of the gate, whose place this
-    takes: the graph must not run. Ctrl-C brakes and holds.
+    The head moves slowly by 0.1 rad each way, within the limits of the gate. The command takes
+    the place of the gate, so the graph must not run. Ctrl-C brakes, and the head holds.
     """
     from rich.console import Console
     from rich.table import Table
@@ -40,7 +40,7 @@ def calibrate(
         with Console(stderr=True).status('waiting for images and joint states ...') as status:
             contents = run_calibration(arguments, patience_s, status.update)
     except KeyboardInterrupt:
-        sys.exit('stopped; the head holds its posture, and nothing was written')
+        sys.exit('stopped; the head holds its posture; no file was written')
     except ValueError as error:
         sys.exit(f'error: {error}')
     table = Table('figure', 'value', 'standard error')
@@ -49,6 +49,6 @@ def calibrate(
         table.add_row(name, str(pair['value']), str(pair['error']))
     Console().print(table)
     if 'camera_delay_s' not in contents:
-        typer.echo('camera_delay_s could not be found to within 10 ms, and is left out')
+        typer.echo('camera_delay_s is left out: its standard error is above 10 ms')
     save(contents, to)
     typer.echo(to)

@@ -45,7 +45,7 @@ def topics(
     ] = 2.0,
     as_json: Json = False,
 ) -> None:
-    """List what the running graph says: type, quality of service, who, how often, what for."""
+    """List the topics of the running graph: type, quality of service, nodes, rate, purpose."""
     from rich.console import Console
 
     from ja_common.ros_arguments import check_ros_arguments

@@ -20,12 +20,15 @@ def register(app: typer.Typer) -> None:
 
 def figures(
     trials: Annotated[
-        int, typer.Option(min=3000, help='Trials a run; the gate keeps its place.')
+        int,
+        typer.Option(
+            min=3000, help='Trials of each run; the schedule of the gate is scaled with it.'
+        ),
     ] = 300_000,
-    seeds: Annotated[int, typer.Option(min=1, help='Runs of every condition.')] = 10,
+    seeds: Annotated[int, typer.Option(min=1, help='Runs of each condition.')] = 10,
     ablations: Annotated[int, typer.Option(min=0, help='Seeds of the ablations; 0: none.')] = 0,
     scene: Annotated[str, typer.Option(help='Scene of the sim, by name or file.')] = 'default',
-    looks_seed: Annotated[int, typer.Option(min=0, help='Seed of the caregiver looked at.')] = 0,
+    looks_seed: Annotated[int, typer.Option(min=0, help='Seed of the caregiver.')] = 0,
     data: Annotated[
         Path | None,
         typer.Option(help='Folder of `./ja export`: recorded looks in place of rendered ones.'),
@@ -41,7 +44,7 @@ def figures(
     from ja_experiments.paper.experiment import Plan
     from ja_experiments.paper.report import write_report
     from ja_experiments.paper.study import StudyConfig, run_study
-    from ja_experiments.progress import Progress
+    from ja_experiments.progress_bars import ProgressBars
 
     config = StudyConfig(
         plan=Plan(trials=trials, seeds=tuple(range(seeds))),
@@ -52,7 +55,7 @@ def figures(
         ablation_seeds=min(ablations, seeds),
         workers=workers,
     )
-    study = run_study(config, Progress())
+    study = run_study(config, ProgressBars())
     folder = output or Path('runs') / f'{time.strftime("%Y%m%d-%H%M%S")}-figures'
     typer.echo(f'The report: {write_report(study, folder)}')
 
@@ -64,15 +67,16 @@ def sweep(
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help='Local processes.')] = _CORES,
     output: Annotated[
-        Path | None, typer.Option(help='Folder of the results; one with results goes on.')
+        Path | None,
+        typer.Option(help='Folder of the results; a run in a folder with results resumes.'),
     ] = None,
 ) -> None:
-    """Run a grid of experiments over seeds and parameters; what is finished is kept."""
+    """Run a grid of experiments over seeds and parameters; finished runs are not repeated."""
     from ja_experiments.paper.study import prepare_materials
-    from ja_experiments.progress import Progress
+    from ja_experiments.progress_bars import ProgressBars
     from ja_experiments.sweep import read_grid, run_sweep
 
-    grid, progress = read_grid(config), Progress()
+    grid, progress = read_grid(config), ProgressBars()
     materials = prepare_materials(grid.scene, looks_seed=0, progress=progress)
     folder = output or Path('runs') / f'sweep-{config.stem}'
     table = run_sweep(grid, materials, folder, progress, scheduler, workers)

@@ -32,7 +32,7 @@ def record(
         float, typer.Option(min=0.0, help='Drop files older than so many seconds; 0: keep all.')
     ] = 0.0,
 ) -> None:
-    """Record every topic of the running graph, whatever its type, as MCAP."""
+    """Record every topic of the running graph, of any type, as MCAP."""
     from ja_bringup.record_and_replay import record as run
 
     parameters = {
@@ -48,20 +48,21 @@ def replay(
     context: typer.Context,
     recording: Annotated[Path, typer.Argument(help='A .mcap file, or a folder of them.')],
     speed: Annotated[
-        float, typer.Option(min=0.001, max=1000.0, help='Recorded seconds a second.')
+        float, typer.Option(min=0.001, max=1000.0, help='Recorded seconds per second.')
     ] = 1.0,
     without: Annotated[
         list[str] | None, typer.Option(help='A topic to leave out; may be given several times.')
     ] = None,
     score: Annotated[
-        bool, typer.Option('--score', help='Publish nothing: teach a learner, print its curve.')
+        bool, typer.Option('--score', help='Publish nothing: train a learner and print its curve.')
     ] = False,
     csv_file: Annotated[
-        Path | None, typer.Option('--csv', help='With --score: one row a trial into this file.')
+        Path | None,
+        typer.Option('--csv', help='With --score: write one row for each trial into this file.'),
     ] = None,
     as_json: Annotated[bool, typer.Option('--json', help='With --score: print JSON.')] = False,
 ) -> None:
-    """Publish a recording again, with /clock, for a node to be tried on it."""
+    """Publish a recording again, with /clock, to try a node on it."""
     from ja_bringup.record_and_replay import replay as run
 
     if score:
@@ -82,9 +83,9 @@ def export(
     recordings: Annotated[
         list[Path], typer.Argument(help='Recordings: .mcap files, or folders of them.')
     ],
-    to: Annotated[Path, typer.Option('--to', help='Folder of the data set, which is made.')],
+    to: Annotated[Path, typer.Option('--to', help='Folder of the data set; it is created.')],
     licence: Annotated[
-        str, typer.Option(help='What its card says about who may use it, and how.')
+        str, typer.Option(help='The licence that the card of the data set names.')
     ] = '',
 ) -> None:
     """Turn recordings into a data set of trials: a Parquet table, PNG faces, and a card."""

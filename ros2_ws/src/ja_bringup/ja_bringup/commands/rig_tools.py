@@ -1,4 +1,4 @@
-"""The commands that try a rig before it is trusted, for `./ja`."""
+"""The commands `faults` and `soak`, for `./ja`: they test a rig before people rely on it."""
 
 import sys
 from pathlib import Path
@@ -19,9 +19,9 @@ def faults(
         str, typer.Option(help='Only faults with this in their name: killed, clock, network, ...')
     ] = '',
 ) -> None:
-    """Do every fault to a simulated rig: kill, freeze, cut, delay; a table of what the head does.
+    """Test every fault on a simulated rig: kill, freeze, cut, delay; print what the head does.
 
-    Exit code 1 when the head did not stop or go on as it has to, or when something was forgotten.
+    Exit code 1 if the head did not stop or continue as it must, or if learned trials were lost.
     """
     from rich import box
     from rich.console import Console
@@ -29,7 +29,9 @@ def faults(
 
     from ja_diagnostics.faults.hosts import CASES, missing, run_on_hosts
     from ja_diagnostics.faults.run import COLUMNS, FaultOutcome, FaultRun
+    from ja_runner.parts import check_installed
 
+    check_installed(['ja_sim'])
     outcomes: list[FaultOutcome] = []
     with TemporaryDirectory() as name:
         folder = Path(name)
@@ -53,13 +55,13 @@ def faults(
 def soak(
     context: typer.Context,
     time_s: Annotated[
-        float, typer.Option('--time', min=60.0, help='Run for so many seconds; hours are meant.')
+        float, typer.Option('--time', min=60.0, help='Run for so many seconds; hours are useful.')
     ] = 3600.0,
     camera_rate_hz: Annotated[
         float, typer.Option(min=1.0, max=240.0, help='Images a second of the simulated camera.')
     ] = 15.0,
 ) -> None:
-    """Run the whole graph in real time for long; a table of what grows, slows down, or is lost."""
+    """Run the whole graph in real time for long; print what grows, slows down, or is lost."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -67,8 +69,10 @@ def soak(
     from ja_common.ros_arguments import parameter_arguments
     from ja_diagnostics.soak import COLUMNS, Soak
     from ja_runner.graph import sim_graph, with_arguments
+    from ja_runner.parts import check_installed
     from ja_runner.run import new_run_folder
 
+    check_installed(['ja_sim'])
     folder = new_run_folder('soak').absolute()
     settings = {
         'lockstep': False,

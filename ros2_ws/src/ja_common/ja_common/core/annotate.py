@@ -1,4 +1,4 @@
-"""Draws what the detector sees, for people."""
+"""Draws detections into the camera image, for people."""
 
 import colorsys
 import math
@@ -22,7 +22,7 @@ _LEAST_WIDTH = 480
 _GOLDEN_RATIO = 0.618033988749895
 
 
-def annotated(
+def annotate_image(
     image: NDArray[np.uint8],
     detections: Sequence[Detection],
     face_image: NDArray[np.uint8] | None,
@@ -30,7 +30,7 @@ def annotated(
     d_th_rad: float,
     latency_s: float,
 ) -> NDArray[np.uint8]:
-    """A copy of an (H, W, 3) RGB image, small ones enlarged, with everything found drawn in."""
+    """Return a copy of an (H, W, 3) RGB image, enlarged if small, with all detections drawn in."""
     enlarge = max(1, math.ceil(_LEAST_WIDTH / image.shape[1]))
     canvas = cv2.resize(image, None, fx=enlarge, fy=enlarge, interpolation=cv2.INTER_LINEAR)
     radius = round(enlarge * camera.fx * math.tan(d_th_rad))
@@ -70,7 +70,7 @@ def _feature_bars(
 
 
 def _inset(canvas: NDArray[np.uint8], face_image: NDArray[np.uint8]) -> None:
-    """The face image, enlarged, in the upper right corner."""
+    """Draw the face image, enlarged, into the upper right corner."""
     scale = max(1, canvas.shape[0] // 4 // face_image.shape[0])
     enlarged = cv2.resize(face_image, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
     height, width = enlarged.shape
@@ -90,6 +90,6 @@ def _at(pixel: tuple[float, float], enlarge: int) -> tuple[int, int]:
 
 
 def _colour_of(track_id: int) -> Colour:
-    """Neighbouring numbers get colours far apart."""
+    """Return the colour of a track; neighbouring numbers get colours far apart."""
     red, green, blue = colorsys.hsv_to_rgb(track_id * _GOLDEN_RATIO % 1, 0.7, 1.0)
     return round(255 * red), round(255 * green), round(255 * blue)

@@ -32,7 +32,7 @@ class CameraModel:
     def from_field_of_view(
         cls, width: int, height: int, field_of_view_rad: float
     ) -> 'CameraModel':
-        """An ideal camera whose image spans ``field_of_view_rad`` from left to right."""
+        """Make an ideal camera whose image spans ``field_of_view_rad`` from left to right."""
         focal = width / 2 / math.tan(field_of_view_rad / 2)
         return cls(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
 
@@ -40,9 +40,10 @@ class CameraModel:
     def from_calibration(
         cls, width: int, height: int, k: Sequence[float], distortion: Sequence[float] = ()
     ) -> 'CameraModel | None':
-        """From the row-major 3x3 matrix ``k`` of CameraInfo; None when uncalibrated (all zero).
+        """Make a camera from the row-major 3x3 matrix ``k`` of CameraInfo; None when it is zero.
 
-        Raises ``ValueError`` when the focal lengths are not positive and finite.
+        A matrix of zeros means that the camera is not calibrated. Raises ``ValueError``
+        when the focal lengths are not positive and finite.
         """
         fx, fy, cx, cy = k[0], k[4], k[2], k[5]
         if not any(k):
@@ -54,20 +55,20 @@ class CameraModel:
 
     @cached_property
     def matrix(self) -> NDArray[np.float64]:
-        """K, shape (3, 3)."""
+        """Return K, shape (3, 3)."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1.0]])
 
     @cached_property
     def inverse_matrix(self) -> NDArray[np.float64]:
-        """K^-1, shape (3, 3)."""
+        """Return K^-1, shape (3, 3)."""
         return np.linalg.inv(self.matrix).astype(np.float64)
 
     def resized(self, width: int, height: int) -> 'CameraModel':
-        """The same camera delivering images of another size."""
+        """Return the same camera for images of another size [px]."""
         return _resized(self, width, height)
 
     def rays(self, pixels: ArrayLike) -> NDArray[np.float64]:
-        """Rays (x, y) with z = 1, shape (..., 2), of pixels (u, v), lens distortion removed."""
+        """Return the rays (x, y), z = 1, of pixels (u, v), both (..., 2), without distortion."""
         pixels = np.asarray(pixels, float)
         if self.distortion:
             # The default of five iterations leaves errors of some hundredths of a pixel.
@@ -79,7 +80,7 @@ class CameraModel:
         return (pixels - (self.cx, self.cy)) / (self.fx, self.fy)
 
     def pixels(self, rays: ArrayLike) -> NDArray[np.float64]:
-        """Pixels (u, v), shape (..., 2), at which rays (x, y) are seen."""
+        """Return the pixels (u, v), shape (..., 2), at which rays (x, y) are seen."""
         rays = np.asarray(rays, float)
         if self.distortion:
             points = np.concatenate([rays.reshape(-1, 2), np.ones((rays.size // 2, 1))], axis=1)
@@ -90,14 +91,14 @@ class CameraModel:
         return rays * (self.fx, self.fy) + (self.cx, self.cy)
 
     def contains(self, pixel: ArrayLike) -> bool:
-        """Does the pixel (u, v) lie in the image? False for NaN (behind the camera)."""
+        """Return whether the pixel (u, v) lies in the image; False for NaN (behind the camera)."""
         u, v = np.asarray(pixel, float)
         return bool(-0.5 <= u < self.width - 0.5 and -0.5 <= v < self.height - 0.5)
 
 
 @lru_cache(maxsize=16)
 def _resized(camera: CameraModel, width: int, height: int) -> CameraModel:
-    # Kept, for it is asked for with every image, and its matrices are kept with it.
+    # Cached: every image asks for it, and its matrices are cached with it.
     sx, sy = width / camera.width, height / camera.height
     return replace(
         camera,

@@ -10,7 +10,7 @@ from typing import Any
 
 
 class ConfigError(ValueError):
-    """A configuration value that cannot be used; the message says which, why and what fits."""
+    """A configuration value that cannot be used; the message names field, reason and range."""
 
 
 class Configuration:

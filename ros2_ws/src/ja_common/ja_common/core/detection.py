@@ -1,4 +1,4 @@
-"""What the detector says of one thing in one image."""
+"""One object or face in one image, as the detector reports it."""
 
 from enum import IntEnum
 from typing import NamedTuple
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 
 class Kind(IntEnum):
-    """What a detection is of."""
+    """The kind of thing that a detection shows."""
 
     OBJECT = 0
     FACE = 1
@@ -40,20 +40,20 @@ class Detection(NamedTuple):
 
     @property
     def ray(self) -> NDArray[np.float64]:
-        """Ray (x, y) in the optical frame, shape (2,)."""
+        """Return the ray (x, y) in the optical frame, shape (2,)."""
         return np.array([self.x, self.y])
 
 
 def objects(detections: list[Detection]) -> list[Detection]:
-    """The objects among the detections."""
+    """Return the objects among the detections."""
     return [d for d in detections if d.kind is Kind.OBJECT]
 
 
 def most_salient(detections: list[Detection]) -> Detection | None:
-    """The object i_trg of Eq. 1, or None when no object is in view."""
+    """Return the object i_trg of Eq. 1, or None when no object is in view."""
     return max(objects(detections), key=lambda d: d.score, default=None)
 
 
 def caregiver_face(detections: list[Detection]) -> Detection | None:
-    """The caregiver's face: the detector reports the caregiver first among faces."""
+    """Return the caregiver's face, the first of the faces, or None when no face is in view."""
     return next((d for d in detections if d.kind is Kind.FACE), None)

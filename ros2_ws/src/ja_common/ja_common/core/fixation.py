@@ -1,4 +1,4 @@
-"""Eq. 3 of Nagai, Hosoda and Asada (2003): does a thing stand in the centre of the image?
+"""Eq. 3 of Nagai, Hosoda and Asada (2003): whether a thing is in the image centre.
 
 The paper measures the distance from the image centre in pixels; here it is measured on the image
 plane at unit focal length (rays), so that one threshold serves every camera. The paper's threshold
@@ -15,12 +15,12 @@ WIDTH_SIXTH = math.atan(2 * math.tan(math.radians(18)) / 6)
 
 
 def stands_in_centre(ray: ArrayLike, d_th_rad: float) -> bool:
-    """Eq. 3: is the ray (x, y) less than d_th [rad] from the optical axis?"""
+    """Return whether the ray (x, y) is less than d_th [rad] from the optical axis (Eq. 3)."""
     return bool(np.hypot(*np.asarray(ray, float)) < math.tan(d_th_rad))
 
 
 def nearest_to_centre(rays: ArrayLike, d_th_rad: float) -> int | None:
-    """Index of the ray, of shape (n, 2), that stands nearest to the centre, if within d_th."""
+    """Return the index of the ray, of (n, 2), nearest to the centre; None if all are beyond d_th."""
     rays = np.asarray(rays, float).reshape(-1, 2)
     if not len(rays):
         return None

@@ -12,8 +12,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
+def finite_pair(what: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return a copy (2,) of two finite numbers (pan, tilt); raise ValueError for anything else.
+
+    `what`: what the values are, for the message.
+    """
+    pair = np.array(values, float)
+    if pair.shape != (2,) or not np.isfinite(pair).all():
+        raise ValueError(f'{what} must be two finite numbers (pan, tilt), got {pair.tolist()}')
+    return pair
+
+
 def vectors_of_directions(directions: ArrayLike) -> NDArray[np.float64]:
-    """Unit vectors, shape (..., 3), of directions, shape (..., 2) [rad], in the base frame."""
+    """Return the unit vectors (..., 3) of directions (..., 2) [rad], in the base frame."""
     directions = np.asarray(directions, float)
     pan, tilt = directions[..., 0], directions[..., 1]
     forward = np.cos(tilt)
@@ -21,33 +32,33 @@ def vectors_of_directions(directions: ArrayLike) -> NDArray[np.float64]:
 
 
 def directions_of_vectors(vectors: ArrayLike) -> NDArray[np.float64]:
-    """Directions (pan, tilt) [rad], shape (..., 2), of base-frame vectors, shape (..., 3)."""
+    """Return the directions (..., 2) (pan, tilt) [rad] of base-frame vectors (..., 3)."""
     vectors = np.asarray(vectors, float)
     x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
     return _as_last_axis(np.arctan2(y, x), -np.arctan2(z, np.hypot(x, y)))
 
 
 def head_rotation(posture: ArrayLike) -> NDArray[np.float64]:
-    """Rotation matrix (3, 3) from the head frame (x forward, y left, z up) to the base frame."""
+    """Return the rotation (3, 3) from head frame (x forward, y left, z up) to base frame."""
     pan, tilt = map(float, np.asarray(posture))
     cp, sp, ct, st = math.cos(pan), math.sin(pan), math.cos(tilt), math.sin(tilt)
     return np.array([[cp * ct, -sp, cp * st], [sp * ct, cp, sp * st], [-st, 0.0, ct]])
 
 
 def vectors_of_rays(posture: ArrayLike, rays: ArrayLike) -> NDArray[np.float64]:
-    """Base-frame vectors, shape (..., 3), of rays (..., 2) from a posture: one unit deep."""
+    """Return base-frame vectors (..., 3) of rays (..., 2) from a posture: one unit deep."""
     rays = np.asarray(rays, float)
     in_head = _as_last_axis(np.ones(rays.shape[:-1]), -rays[..., 0], -rays[..., 1])
     return in_head @ head_rotation(posture).T
 
 
 def directions_of_rays(posture: ArrayLike, rays: ArrayLike) -> NDArray[np.float64]:
-    """Directions, shape (..., 2) [rad], of things seen at rays (..., 2) from a posture."""
+    """Return the directions, shape (..., 2) [rad], of what is seen at rays (..., 2)."""
     return directions_of_vectors(vectors_of_rays(posture, rays))
 
 
 def rays_of_directions(posture: ArrayLike, directions: ArrayLike) -> NDArray[np.float64]:
-    """Rays, shape (..., 2), at which directions [rad] are seen from a posture; NaN if behind."""
+    """Return the rays, shape (..., 2), at which directions [rad] are seen; NaN if behind."""
     in_head = vectors_of_directions(directions) @ head_rotation(posture)
     forward = in_head[..., :1]
     with np.errstate(divide='ignore', invalid='ignore'):
@@ -55,7 +66,7 @@ def rays_of_directions(posture: ArrayLike, directions: ArrayLike) -> NDArray[np.
 
 
 def angle_between(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
-    """Angle [rad] between directions of shape (..., 2), along the great circle (haversine)."""
+    """Return the angle [rad] between directions (..., 2), along the great circle (haversine)."""
     a, b = np.asarray(a, float), np.asarray(b, float)
     squares = np.sin((a - b) / 2) ** 2
     share = squares[..., 1] + np.cos(a[..., 1]) * np.cos(b[..., 1]) * squares[..., 0]

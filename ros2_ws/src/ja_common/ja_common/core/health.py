@@ -1,4 +1,4 @@
-"""A node's health: what it waits for, what went wrong; no ROS in here."""
+"""The health of a node: which inputs are silent, and which problems occurred. No ROS."""
 
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -13,21 +13,21 @@ class Level(IntEnum):
     STALE = 3
 
 
-FIRST_WORD_TIMES = 3.0
-"""An input that has never spoken is given so many times as long: others may still be starting."""
+FIRST_MESSAGE_TIMES = 3.0
+"""Before its first message an input may be silent so many times as long: nodes are starting."""
 
 
 @dataclass
 class _Input:
     expected_every_s: float | None
-    heard: int = 0
-    heard_at_s: float | None = None
+    received: int = 0
+    received_at_s: float | None = None
     recent: int = 0
 
 
 @dataclass
 class Report:
-    """One report of a node: the worst level, one sentence, and figures to look at."""
+    """One report of a node: the worst level, all problems in one text, and figures."""
 
     level: Level
     message: str
@@ -48,48 +48,50 @@ class Health:
         self._reported_s = now_s
         self.values: dict[str, str] = {}
 
-    def expect(self, name: str, every_s: float | None) -> None:
+    def watch_input(self, name: str, every_s: float | None) -> None:
         """Watch an input; silence for longer than `every_s` is a WARN (None: never)."""
         self._inputs[name] = _Input(every_s)
 
     def record_message(self, name: str, now_s: float) -> None:
-        """An input spoke."""
+        """Count a message of an input."""
         entry = self._inputs[name]
-        entry.heard += 1
+        entry.received += 1
         entry.recent += 1
-        entry.heard_at_s = now_s
+        entry.received_at_s = now_s
 
-    def problem(self, where: str, message: str, now_s: float, level: Level = Level.ERROR) -> bool:
-        """Something went wrong; True when it is news (so that the log is not flooded)."""
+    def record_problem(
+        self, where: str, message: str, now_s: float, level: Level = Level.ERROR
+    ) -> bool:
+        """Record a problem; return True when it is news (so that the log is not flooded)."""
         known = self._problems.get(where)
         news = known is None or known[1] != message or now_s - known[2] > self._error_memory_s
         self._problems[where] = (level, message, now_s)
         return news
 
-    def resolved(self, where: str) -> None:
-        """A problem is over."""
+    def clear_problem(self, where: str) -> None:
+        """Remove a problem that is over."""
         self._problems.pop(where, None)
 
-    def silent(self, now_s: float) -> dict[str, float]:
-        """Inputs silent for longer than expected, with the time [s] that was allowed."""
+    def silent_inputs(self, now_s: float) -> dict[str, float]:
+        """Return the inputs that are silent for longer than expected: name -> allowed time [s]."""
         silence = {}
         for name, entry in self._inputs.items():
             if entry.expected_every_s is None:
                 continue
-            allowed_s, since_s = entry.expected_every_s, entry.heard_at_s
+            allowed_s, since_s = entry.expected_every_s, entry.received_at_s
             if since_s is None:
-                allowed_s, since_s = FIRST_WORD_TIMES * allowed_s, self._started_s
+                allowed_s, since_s = FIRST_MESSAGE_TIMES * allowed_s, self._started_s
             if now_s - since_s > allowed_s:
                 silence[name] = allowed_s
         return silence
 
     def report(self, now_s: float) -> Report:
-        """Everything in one report; rates are those since the last report."""
+        """Return everything in one report; rates are those since the last report."""
         seconds = max(now_s - self._reported_s, 1e-9)
         self._reported_s = now_s
         values = dict(self.values)
         for name, entry in self._inputs.items():
-            values[f'{name} received'] = str(entry.heard)
+            values[f'{name} received'] = str(entry.received)
             values[f'{name} rate [1/s]'] = f'{entry.recent / seconds:.1f}'
             entry.recent = 0
         self._problems = {

@@ -1,4 +1,4 @@
-"""The success curve of a run: what came of every trial, and how sure the rates are."""
+"""The success curve of a run: the outcome of every trial, and success rates with intervals."""
 
 from dataclasses import dataclass
 
@@ -23,28 +23,28 @@ class TrialRecord:
 
 
 class LearningCurve:
-    """Trials in the order they ended."""
+    """Scored trials, in the order in which they ended."""
 
     def __init__(self) -> None:
         self.records: list[TrialRecord] = []
         self.stage = ''
 
-    def add(self, success: bool, p_lm: float, elapsed_s: float) -> None:
-        """The next trial has ended."""
+    def record_trial(self, success: bool, p_lm: float, elapsed_s: float) -> None:
+        """Record the outcome of the trial that has just ended."""
         number = len(self.records) + 1
         self.records.append(TrialRecord(number, success, p_lm, elapsed_s, self.stage))
 
-    def of_stage(self, stage: str) -> list[TrialRecord]:
-        """The trials of one part of the course."""
+    def trials_of_stage(self, stage: str) -> list[TrialRecord]:
+        """Return the trials of one part of the course."""
         return [record for record in self.records if record.stage == stage]
 
     def rate(self, trials: slice = slice(None), stage: str | None = None) -> Rate:
-        """Success rate among some of the trials, of one stage if one is named."""
-        chosen = (self.records if stage is None else self.of_stage(stage))[trials]
+        """Return the success rate of some of the trials, of one stage where one is named."""
+        chosen = (self.records if stage is None else self.trials_of_stage(stage))[trials]
         return Rate(sum(record.success for record in chosen), len(chosen))
 
     def recent_rates(self, window: int) -> NDArray[np.float64]:
-        """Success rate after every trial, shape (n,), over the last `window` of its stage."""
+        """Return the success rate after every trial, (n,), over the last `window` of its stage."""
         successes = np.cumsum([0, *(record.success for record in self.records)])
         trials = np.arange(1, len(successes))
         stages = [record.stage for record in self.records]

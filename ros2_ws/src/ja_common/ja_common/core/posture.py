@@ -8,6 +8,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ja_common.core.geometry import finite_pair
 from ja_common.core.stamps import NS_PER_S
 
 Item = TypeVar('Item')
@@ -16,10 +17,10 @@ REORDERED_WITHIN_S = 0.25
 """A sample older than the newest by more than this was not overtaken: the clock was set back."""
 
 LONGEST_GAP_S = 0.5
-"""Between samples farther apart than this nobody knows where the head was."""
+"""Between samples farther apart than this the posture is unknown."""
 
 STILL_BELOW_RAD_S = 0.05
-"""Speed [rad/s] below which a joint stands still, unless a node is told another."""
+"""Speed [rad/s] below which a joint stands still, the default of every node."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Posture:
     velocity: NDArray[np.float64]
 
     def is_still(self, still_below_rad_s: float) -> bool:
-        """Are both joints slower than the given speed [rad/s]?"""
+        """Return whether both joints are slower than the given speed [rad/s]."""
         return all(abs(speed) < still_below_rad_s for speed in self.velocity.tolist())
 
 
@@ -51,18 +52,18 @@ class PostureHistory:
     def record_posture(
         self, stamp_ns: int, position: ArrayLike, velocity: ArrayLike | None = None
     ) -> None:
-        """Record a sample: position (2,) [rad], and velocity (2,) [rad/s] where the encoder gives it.
+        """Record a sample: position (2,) [rad], velocity (2,) [rad/s] if the encoder gives it.
 
         Raises ValueError for values that are not two finite numbers; nothing is then added.
         """
-        position = _two_finite('joint position', position)
+        position = finite_pair('joint position', position)
         if self._stamps and stamp_ns < self._stamps[-1] - _ns(REORDERED_WITHIN_S):
             self.clear()
         index = bisect_left(self._stamps, stamp_ns)
         if index < len(self._stamps) and self._stamps[index] == stamp_ns:
             return
         if velocity is not None:
-            velocity = _two_finite('joint velocity', velocity)
+            velocity = finite_pair('joint velocity', velocity)
         elif index:
             before = self._samples[index - 1]
             seconds = (stamp_ns - before.stamp_ns) / NS_PER_S
@@ -81,11 +82,11 @@ class PostureHistory:
 
     @property
     def newest(self) -> Posture | None:
-        """The latest sample; for an image use `at` with the image's stamp, never this."""
+        """Return the latest sample; for an image use `at` with the image's stamp, never this."""
         return self._samples[-1] if self._samples else None
 
     def at(self, stamp_ns: int) -> Posture | None:
-        """Posture at a stamp; None outside of what is known (yet), and within a gap."""
+        """Return the posture at a stamp; None outside of what is known (yet), and within a gap."""
         index = bisect_left(self._stamps, stamp_ns)
         if index == len(self._stamps):
             return None
@@ -109,7 +110,7 @@ class PostureJoin(Generic[Item]):
     """Holds stamped items until the posture at their stamp is known, and gives them in order.
 
     An item whose posture can no longer become known (older than the history, or more than
-    `depth` items waiting) is given with None, so that the caller can say so: nothing is lost.
+    `depth` items waiting) is given with None, so that the caller can report it.
     An item from the future (a clock that was set back) waits without holding up the others.
     """
 
@@ -123,11 +124,11 @@ class PostureJoin(Generic[Item]):
         self._waiting.append((stamp_ns, item))
 
     def __len__(self) -> int:
-        """How many items wait."""
+        """Return how many items wait."""
         return len(self._waiting)
 
     def pop_ready(self) -> Iterator[tuple[Item, Posture | None]]:
-        """Yield the items whose waiting is over, oldest first, with their posture (None: unknowable).
+        """Yield the items whose waiting is over, oldest first; posture None: it stays unknown.
 
         An item is taken out when it is given: if its handling fails, those after it still wait.
         """
@@ -147,10 +148,3 @@ class PostureJoin(Generic[Item]):
 
 def _ns(seconds: float) -> int:
     return int(seconds * NS_PER_S)
-
-
-def _two_finite(what: str, values: ArrayLike) -> NDArray[np.float64]:
-    array = np.array(values, float)
-    if array.shape != (2,) or not np.all(np.isfinite(array)):
-        raise ValueError(f'{what} must be two finite numbers (pan, tilt), got {values!r}')
-    return array

@@ -1,9 +1,9 @@
-"""The attention cycle: look at the caregiver, glance aside if the learner wants it, shift, ask
-whether an object is fixated, look back.
+"""The attention cycle: look at the caregiver, glance aside if the learner asks for it, shift,
+check whether an object is fixated, look back.
 
-One `step` an image. At every shift the gate draws whether visual feedback (VF) or the learning
-module (LM) turns the head (Nagai et al. 2003, section 2.2.5). A trial is what lies between two
-looks at the caregiver.
+Call `step` once an image. At every shift the gate draws whether visual feedback (VF) or the
+learning module (LM) turns the head (Nagai et al. 2003, section 2.2.5). A trial lasts from one look
+at the caregiver to the next.
 """
 
 import math
@@ -21,7 +21,7 @@ from ja_control.core.gating import Gating
 
 
 class Phase(Enum):
-    """What the head is about."""
+    """What the head does now."""
 
     LOOK = 'look'
     GLANCE = 'glance'
@@ -31,7 +31,7 @@ class Phase(Enum):
 
 
 class Source(Enum):
-    """Whose proposal moves the head."""
+    """The module whose proposal moves the head."""
 
     NONE = 'none'
     FACE = 'face'
@@ -54,14 +54,14 @@ class AttentionCycleConfig(Configuration):
         STILL_BELOW_RAD_S, 'a joint slower than this stands still', low=1e-4, high=5.0
     )
     arrived_within_rad: float = parameter(
-        0.02, 'a shift has arrived when the head stands still this near to its aim',
+        0.02, 'a shift has arrived when the head stands still this near to its target',
         low=1e-4, high=0.5,
     )  # fmt: skip
     settle_timeout_s: float = parameter(
-        1.5, 'a shift that has not arrived by then is judged where it stands', low=0.05, high=60.0
+        1.5, 'a shift that has not arrived by then ends where the head stands', low=0.05, high=60.0
     )
     max_glances: int = parameter(
-        2, 'glances before the first shift, at views that the learner wants', low=0, high=20
+        2, 'glances before the first shift, at views that the learner proposes', low=0, high=20
     )
     fixation_wait_s: float = parameter(
         0.0,
@@ -94,9 +94,9 @@ class AttentionCycleConfig(Configuration):
 class CycleInput:
     """What the gate knows about one image: posture at its stamp, and proposals (2,) [rad] or None.
 
-    `glance_delta`: to a view that the learner wants before the shift. `fixation`: direction (2,)
-    [rad] of the object that stands in the centre, if any does. `log_evidence` [nats]: that the
-    learner does better than chance.
+    `glance_delta`: to a view that the learner proposes before the shift. `fixation`: direction
+    (2,) [rad] of the object in the centre, or None. `log_evidence` [nats]: that the learner does
+    better than chance.
     """
 
     posture: Posture
@@ -110,7 +110,7 @@ class CycleInput:
 
 @dataclass(frozen=True)
 class Decision:
-    """What the cycle decided on an image: the posture to take, and why."""
+    """The decision on one image: the posture to take (2,) [rad], and why."""
 
     target: NDArray[np.float64]
     phase: Phase
@@ -121,10 +121,10 @@ class Decision:
 
 
 class AttentionCycle:
-    """The state of the cycle; every random draw comes from the generator it is given.
+    """The state of the cycle; every random draw comes from `rng`.
 
-    `reachable` gives the posture (2,) [rad] at which a motion towards a target ends: a shift that
-    is aimed outside the limits has arrived where the limits end.
+    `reachable` returns the posture (2,) [rad] at which a motion towards a target ends: a shift to
+    a target outside the limits has arrived where the limits end.
     """
 
     def __init__(
@@ -143,36 +143,36 @@ class AttentionCycle:
         self._target: NDArray[np.float64] | None = None
         self._learner_drawn = False
         self._p_lm = gating.p_lm(0, 0.0)
-        self._begin(Phase.LOOK)
+        self._enter_phase(Phase.LOOK)
 
     def go_home(self) -> None:
-        """Give up what is under way, forget where the caregiver was, and turn home."""
+        """End the trial, forget where the caregiver was, and turn home."""
         self._caregiver = None
-        self._begin(Phase.HOME)
+        self._enter_phase(Phase.HOME)
 
     def restart(self) -> None:
-        """Give up what is under way (after a hold or a jump of the clock) and look again.
+        """End the trial (after a hold or a jump of the clock) and look at the caregiver again.
 
-        Only the order to turn home outlives it.
+        A turn to the home posture goes on.
         """
         self._target = None
-        self._begin(Phase.HOME if self.phase is Phase.HOME else Phase.LOOK)
+        self._enter_phase(Phase.HOME if self.phase is Phase.HOME else Phase.LOOK)
 
     def step(self, percept: CycleInput) -> Decision:
-        """One image: advance the cycle, and say which posture to take."""
+        """Advance the cycle by one image, and return which posture to take."""
         step = {
-            Phase.LOOK: self._look,
-            Phase.GLANCE: self._glance,
-            Phase.SHIFT: self._shift,
-            Phase.SEARCH: self._search,
-            Phase.HOME: self._home,
+            Phase.LOOK: self._step_look,
+            Phase.GLANCE: self._step_glance,
+            Phase.SHIFT: self._step_shift,
+            Phase.SEARCH: self._step_search,
+            Phase.HOME: self._step_home,
         }[self.phase]
         self._p_lm = self.gating.p_lm(self.trials, percept.log_evidence)
         step(percept)
         target = percept.posture.position if self._target is None else self._target
         return Decision(target, self.phase, self._source, self._p_lm, self.trials, self._shifts)
 
-    def _begin(self, phase: Phase) -> None:
+    def _enter_phase(self, phase: Phase) -> None:
         self.phase = phase
         self._source = Source.NONE
         self._shifts = self._glances = 0
@@ -185,64 +185,64 @@ class AttentionCycle:
             self._since_ns = percept.posture.stamp_ns
         return (percept.posture.stamp_ns - self._since_ns) / NS_PER_S
 
-    def _look(self, percept: CycleInput) -> None:
+    def _step_look(self, percept: CycleInput) -> None:
         face = percept.face_delta
         if self._face_in_view is not (face is not None):
-            # Dwelling on the face and missing it are two waits; each starts anew.
+            # Dwelling on the face and missing it are two waits; each starts from zero.
             self._face_in_view = face is not None
             self._since_ns = None
         if face is None:
-            self._look_where_the_face_was(percept)
+            self._look_at_last_face(percept)
             return
         self._source = Source.FACE
         self._caregiver = percept.posture.position + face
-        if math.hypot(*face) > self.config.look_tolerance_rad or not self._still(percept):
+        if math.hypot(*face) > self.config.look_tolerance_rad or not self._is_still(percept):
             self._target = self._caregiver
             self._since_ns = None
             return
-        # Centred: hold still, so that nothing but the caregiver moves in the picture of the face.
+        # Centred: hold still, so that only the caregiver moves in the image of the face.
         if self._elapsed_s(percept) >= self.config.dwell_s:
-            self._begin(Phase.GLANCE)
-            self._glance_on(percept)
+            self._enter_phase(Phase.GLANCE)
+            self._glance_or_shift(percept)
 
-    def _glance(self, percept: CycleInput) -> None:
-        if self._arrived(percept):
-            self._glance_on(percept)
+    def _step_glance(self, percept: CycleInput) -> None:
+        if self._has_arrived(percept):
+            self._glance_or_shift(percept)
 
-    def _glance_on(self, percept: CycleInput) -> None:
-        """To the next view that is wanted, or else the first shift."""
+    def _glance_or_shift(self, percept: CycleInput) -> None:
+        """Turn to the next proposed view, or start the first shift."""
         if percept.glance_delta is None or self._glances >= self.config.max_glances:
-            self._begin(Phase.SHIFT)
-            self._draw(percept)
+            self._enter_phase(Phase.SHIFT)
+            self._start_shift(percept)
             return
         self._glances += 1
         self._source = Source.GLANCE
-        self._turn(percept, percept.glance_delta)
+        self._turn_by(percept, percept.glance_delta)
 
-    def _look_where_the_face_was(self, percept: CycleInput) -> None:
+    def _look_at_last_face(self, percept: CycleInput) -> None:
         self._source = Source.NONE
         if self._caregiver is not None:
             self._target = self._caregiver
-        if self._elapsed_s(percept) >= self.config.search_after_s and self._still(percept):
+        if self._elapsed_s(percept) >= self.config.search_after_s and self._is_still(percept):
             self._caregiver = None
-            self._begin(Phase.SEARCH)
+            self._enter_phase(Phase.SEARCH)
 
-    def _shift(self, percept: CycleInput) -> None:
-        if not self._arrived(percept):
+    def _step_shift(self, percept: CycleInput) -> None:
+        if not self._has_arrived(percept):
             return
         if percept.fixation is None and self._rested_s(percept) < self.config.fixation_wait_s:
             return
         self._shifts += 1
         if percept.fixation is None and self._shifts < self.config.max_shifts:
-            self._draw(percept)
+            self._start_shift(percept)
             return
         self.trials += 1
-        self._begin(Phase.LOOK)
+        self._enter_phase(Phase.LOOK)
         if self._caregiver is not None:
             self._target = self._caregiver
 
-    def _draw(self, percept: CycleInput) -> None:
-        # Drawn whether or not the learner has an answer: the same seed gives the same sequence of
+    def _start_shift(self, percept: CycleInput) -> None:
+        # Drawn even when the learner has no answer: the same seed gives the same sequence of
         # sources.
         if self._shifts == 0 or self.config.source_drawn == 'every_shift':
             self._learner_drawn = bool(self._rng.random() < self._p_lm)
@@ -250,47 +250,47 @@ class AttentionCycle:
         self._source = Source.LEARNING_MODULE
         if delta is None:
             self._source, delta = Source.VISUAL_FEEDBACK, percept.vf_delta
-        self._turn(percept, np.zeros(2) if delta is None else delta)
+        self._turn_by(percept, np.zeros(2) if delta is None else delta)
 
-    def _turn(self, percept: CycleInput, delta: NDArray[np.float64]) -> None:
+    def _turn_by(self, percept: CycleInput, delta: NDArray[np.float64]) -> None:
         self._target = percept.posture.position + delta
         self._since_ns = percept.posture.stamp_ns
         self._rests_since_ns = None
 
     def _rested_s(self, percept: CycleInput) -> float:
-        """How long the head has been where the shift has led."""
+        """Time [s] since the head arrived at the target of the shift."""
         if self._rests_since_ns is None:
             self._rests_since_ns = percept.posture.stamp_ns
         return (percept.posture.stamp_ns - self._rests_since_ns) / NS_PER_S
 
-    def _search(self, percept: CycleInput) -> None:
+    def _step_search(self, percept: CycleInput) -> None:
         if percept.face_delta is not None:
-            self._begin(Phase.LOOK)
-            self._look(percept)
+            self._enter_phase(Phase.LOOK)
+            self._step_look(percept)
             return
         c = self.config
         angle = 2 * math.pi * self._elapsed_s(percept) / c.search_period_s
         sweep = [c.search_pan_rad * math.sin(angle), c.search_tilt_rad * math.sin(3 * angle)]
         self._target = self._home_posture() + sweep
 
-    def _home(self, percept: CycleInput) -> None:
+    def _step_home(self, percept: CycleInput) -> None:
         self._target = self._home_posture()
-        if self._arrived(percept):
-            self._begin(Phase.LOOK)
+        if self._has_arrived(percept):
+            self._enter_phase(Phase.LOOK)
 
     def _home_posture(self) -> NDArray[np.float64]:
         return np.array([self.config.home_pan_rad, self.config.home_tilt_rad])
 
-    def _still(self, percept: CycleInput) -> bool:
+    def _is_still(self, percept: CycleInput) -> bool:
         return percept.posture.is_still(self.config.still_below_rad_s)
 
-    def _arrived(self, percept: CycleInput) -> bool:
+    def _has_arrived(self, percept: CycleInput) -> bool:
         if self._elapsed_s(percept) >= self.config.settle_timeout_s:
             return True
         return (
             self._target is not None
             and percept.posture.stamp_ns != self._since_ns
-            and self._still(percept)
+            and self._is_still(percept)
             and _within(
                 percept.posture.position,
                 self._reachable(self._target),

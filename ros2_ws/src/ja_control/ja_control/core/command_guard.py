@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ja_common.core.config import Configuration, parameter
+from ja_common.core.geometry import finite_pair
 from ja_common.core.health import Level
 from ja_control.core.joint_limits import JointLimits, JointLimitsConfig
 from ja_control.core.motion_profile import MotionProfile
@@ -131,7 +132,7 @@ class CommandGuard:
 
     @property
     def engaged(self) -> bool:
-        """Return whether the head follows targets: not in a hold, nor before the restart after it."""
+        """Return whether the head follows targets: not in a hold, nor before its restart."""
         return self._engaged
 
     @property
@@ -165,7 +166,7 @@ class CommandGuard:
 
         Raises ValueError when it is not finite.
         """
-        measured = _two_finite('measured posture', position)
+        measured = finite_pair('measured posture', position)
         self._advance_clock(now_s)
         self._measured = measured
         self._measured_s = now_s - age_s
@@ -175,7 +176,7 @@ class CommandGuard:
 
         Raises ValueError when it is not finite; the last target then stays.
         """
-        target = _two_finite('target posture', target)
+        target = finite_pair('target posture', target)
         far = np.abs(target - self._target) > self.config.dead_zone_rad
         self._target = np.where(far, target, self._target)
 
@@ -311,10 +312,3 @@ class CommandGuard:
             return False
         self._stalled_until_s = self._now_s + self.config.retry_after_s
         return True
-
-
-def _two_finite(what: str, values: ArrayLike) -> NDArray[np.float64]:
-    array = np.array(values, float)
-    if array.shape != (2,) or not np.isfinite(array).all():
-        raise ValueError(f'{what} must be two finite angles (pan, tilt), got {array.tolist()}')
-    return array

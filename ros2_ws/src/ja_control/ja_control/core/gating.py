@@ -46,8 +46,9 @@ class Gating:
     def p_lm(self, trials: int, log_evidence: float = 0.0) -> float:
         """Return the probability, 0-1, that the next shift takes the learner's proposal.
 
-        `log_evidence` [nats]: log Bayes factor of 'the learner predicts better than chance' against
-        'chance'. With even prior odds and a centre of 0, p(LM) is the probability of the former.
+        `log_evidence` [nats]: log Bayes factor of 'the learner predicts better than chance'
+        against 'chance'. With even prior odds and a centre of 0, p(LM) is the probability
+        of the former.
         """
         c = self._config
         if c.gating == 'constant':

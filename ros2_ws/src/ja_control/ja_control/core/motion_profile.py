@@ -1,8 +1,8 @@
 """The trapezoidal motion profile of one joint, in steps of a fixed period.
 
 Every period of h seconds the velocity v becomes v' and the position p becomes p + v' h, with
-|v'| <= V and |v' - v| <= A h. A speed that only grows while the joint can
-still stop before a position never passes that position, whatever the targets were meanwhile.
+|v'| <= V and |v' - v| <= A h. A speed that only grows while the joint can still stop before a
+position never passes that position, whatever the targets were meanwhile.
 """
 
 import math
@@ -12,13 +12,14 @@ def stopping_speed(distance: float, speed_step: float, period_s: float) -> float
     """Return the largest speed for the next period from which a joint stops within `distance`.
 
     Speeds fall by at most `speed_step` (= A h) a period. With the speed m = n + f in units of A h
-    (n whole, 0 <= f < 1) the distance to a stop is A h^2 (n (n + 1) / 2 + f (n + 1)): inverted here.
+    (n whole, 0 <= f < 1) the distance to a stop is A h^2 (n (n + 1) / 2 + f (n + 1)); this is its
+    inverse.
     """
     if distance <= 0.0:
         return 0.0
-    way = distance / (speed_step * period_s)
-    n = math.floor((math.sqrt(8.0 * way + 1.0) - 1.0) / 2.0)
-    return speed_step * (n + (way - n * (n + 1) / 2.0) / (n + 1))
+    scaled = distance / (speed_step * period_s)
+    n = math.floor((math.sqrt(8.0 * scaled + 1.0) - 1.0) / 2.0)
+    return speed_step * (n + (scaled - n * (n + 1) / 2.0) / (n + 1))
 
 
 class MotionProfile:

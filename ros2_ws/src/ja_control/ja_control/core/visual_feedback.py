@@ -18,7 +18,7 @@ class VisualFeedbackConfig(Configuration):
 
 
 def visual_feedback(ray: ArrayLike, gain: float) -> NDArray[np.float64]:
-    """Return the change of posture (pan, tilt), (2,) [rad], that centres an object at a ray (x, y).
+    """Return the change of posture (pan, tilt), (2,) [rad], that centres a ray (x, y).
 
     Eq. 2: (dpan, dtilt) = g (x_i - c_x, y_i - c_y), with the distance from the centre in units of
     the focal length and the axes of REP-103: an object right of the centre needs negative pan,

@@ -1,4 +1,4 @@
-"""What the live page shows, gathered from what the graph says: no ROS and no web in here."""
+"""The state of the live page, from the messages of the graph: no ROS and no web here."""
 
 import math
 from collections import Counter, deque
@@ -15,19 +15,19 @@ from ja_common.core.learning_curve import LearningCurve
 
 WINDOW_TRIALS = 100
 STOPPED_AFTER_S = 2.0
-"""Without a new image for so long [s] the graph counts as stopped."""
+"""The graph counts as stopped after this time without a new image [s]."""
 _SILENT_AFTER_S = 3.0  # every node reports its health at 1 Hz
 _LOG_LINES = 200
 _CURVE_POINTS = 200
-_DOING = {
+_ACTIVITIES = {
     ('look', ''): 'turning back to where the caregiver was',
     ('look', 'face'): 'looking at the caregiver',
-    ('shift', 'VF'): 'turning to what stands out (visual feedback)',
-    ('shift', 'LM'): 'turning to where it believes she looks (learning module)',
+    ('shift', 'VF'): 'turning to the most salient object (visual feedback)',
+    ('shift', 'LM'): 'turning to the predicted gaze target (learning module)',
     ('search', ''): 'searching for the caregiver',
     ('home', ''): 'turning home',
 }
-"""In words, by the phase and the source that the gate tells."""
+"""Texts by the phase and the source in the status of the gate."""
 _CURVE_EVERY_S = 1.0
 
 
@@ -50,33 +50,33 @@ class State:
 
     @property
     def is_live(self) -> bool:
-        """Is the picture of now?"""
+        """Return whether the picture is current."""
         return self.run in (RunState.RUNNING, RunState.HELD)
 
 
 @dataclass(frozen=True)
-class Light:
-    """One node's health as last reported; `values` are its figures."""
+class NodeHealth:
+    """Health of one node as last reported; `values` are its figures."""
 
     node: str
     level: Level
     message: str
-    heard_s: float
+    reported_s: float
     values: Mapping[str, str]
 
-    def now(self, now_s: float) -> 'Light':
-        """The light at a time: STALE when the node has fallen silent."""
-        silent_s = now_s - self.heard_s
+    def at(self, now_s: float) -> 'NodeHealth':
+        """Return the health at a time: STALE when the node is silent."""
+        silent_s = now_s - self.reported_s
         if silent_s < _SILENT_AFTER_S:
             return self
-        return Light(
-            self.node, Level.STALE, f'silent for {silent_s:.0f} s', self.heard_s, self.values
+        return NodeHealth(
+            self.node, Level.STALE, f'silent for {silent_s:.0f} s', self.reported_s, self.values
         )
 
 
 @dataclass(frozen=True)
 class TruthView:
-    """Where the objects of the sim are, (n, 3) [m] and (n, 2) [rad]; which one she means."""
+    """Where the objects of the sim are, (n, 3) [m] and (n, 2) [rad]; index of the attended one."""
 
     positions: NDArray[np.float64]
     directions: NDArray[np.float64]
@@ -84,12 +84,12 @@ class TruthView:
 
 
 @dataclass(frozen=True)
-class Glance:
-    """What the robot sees and does at one image; postures and directions are (pan, tilt) [rad].
+class SceneView:
+    """Detections, posture and belief at one image; postures and directions are (pan, tilt) [rad].
 
     `half_view` is half the field of view [rad], sideways and upward; `low` and `high` are the
     limits of the joints, `detections` stand at `directions` (n, 2). `belief` (m, 3) holds samples
-    of the learner's belief: direction and weight. `truth` is there on request, in simulation.
+    of the learner's belief: direction and weight. `truth` is set on request, in simulation.
     """
 
     half_view: tuple[float, float]
@@ -115,7 +115,7 @@ class CurvePoints:
 
     @classmethod
     def of(cls, curve: LearningCurve) -> 'CurvePoints':
-        """Some of the trials, the last one among them: as many as a screen can show."""
+        """Thin a curve to the points that a screen can show; the last trial is one of them."""
         count = len(curve.records)
         chosen = np.arange(count)[:: -max(1, -(-count // _CURVE_POINTS))][::-1]
         rates = curve.recent_rates(WINDOW_TRIALS)[chosen]
@@ -128,7 +128,7 @@ class CurvePoints:
 
 
 class ViewModel:
-    """Trials, lights, log and state of the graph; times in seconds, monotonic."""
+    """Trials, health of the nodes, log and state of the graph; times in seconds, monotonic."""
 
     def __init__(self, now_s: float) -> None:
         self.curve = LearningCurve()
@@ -136,8 +136,8 @@ class ViewModel:
         self.fixations: Counter[str] = Counter()
         self.log: deque[tuple[int, str]] = deque(maxlen=_LOG_LINES)
         self.log_lines = 0
-        self._lights: dict[str, Light] = {}
-        self._began_s = now_s
+        self._node_health: dict[str, NodeHealth] = {}
+        self._start_s = now_s
         self._stamp_ns: int | None = None
         self._new_image_s = now_s
         self._any_image_s = now_s
@@ -145,78 +145,78 @@ class ViewModel:
         self._points = CurvePoints()
         self._drawn_s = -math.inf
 
-    def watch(self, now_s: float) -> None:
-        """Somebody begins to look: silence is counted from here."""
+    def reset_silence(self, now_s: float) -> None:
+        """Count silence from now on: a viewer has come."""
         self._new_image_s = now_s
 
-    def hear_image(self, stamp_ns: int, now_s: float) -> None:
-        """An image has come, perhaps the last one again."""
+    def record_image(self, stamp_ns: int, now_s: float) -> None:
+        """Record an image; the same stamp again is no new image."""
         self._any_image_s = now_s
         if stamp_ns != self._stamp_ns:
             self._stamp_ns, self._new_image_s = stamp_ns, now_s
 
-    def hear_fixation(self) -> None:
-        """An object stands in the centre; the gate's status tells whose shift brought it there."""
+    def record_fixation(self) -> None:
+        """Record a fixation; it counts for the source of the last shift in the gate's status."""
         self._fixated = True
 
-    def hear_gate(self, values: Mapping[str, str]) -> None:
-        """The gate's status: it leaves the phase of shifts when a trial ends."""
+    def record_gate_status(self, values: Mapping[str, str]) -> None:
+        """Record the values of the gate's status; a trial ends when the phase of shifts does."""
         if self.gate.get('phase') == 'shift' and values.get('phase') != 'shift':
             self.fixations[self.gate.get('source', 'none') if self._fixated else 'none'] += 1
             self._fixated = False
-        # The source is said with decisions alone, and stands until the next one.
+        # Only a status with a decision has a source; it stays until the next one.
         self.gate = {**{key: self.gate.get(key, '-') for key in ('source', 'p_lm')}, **values}
 
-    def hear_score(self, success: bool, now_s: float) -> None:
-        """A trial was scored."""
+    def record_trial(self, success: bool, now_s: float) -> None:
+        """Record the score of a trial."""
         p_lm = self.gate.get('p_lm', '-')
         known = float('nan') if p_lm == '-' else float(p_lm)
-        self.curve.add(success, known, now_s - self._began_s)
+        self.curve.record_trial(success, known, now_s - self._start_s)
 
-    def hear_health(self, light: Light) -> None:
-        """A node's report."""
-        self._lights[light.node] = light
+    def record_health(self, health: NodeHealth) -> None:
+        """Record the health of a node."""
+        self._node_health[health.node] = health
 
-    def hear_log(self, line: str) -> None:
-        """A line that somebody has logged, or an answer to one who pressed a button."""
+    def append_log(self, line: str) -> None:
+        """Append a line of a node's log, or the answer to a button."""
         self.log_lines += 1
         self.log.append((self.log_lines, line))
 
-    def lights(self, now_s: float) -> list[Light]:
-        """All nodes ever heard of, in the order of their names."""
-        return [self._lights[name].now(now_s) for name in sorted(self._lights)]
+    def node_health(self, now_s: float) -> list[NodeHealth]:
+        """Return the health of all nodes so far, in the order of their names."""
+        return [self._node_health[name].at(now_s) for name in sorted(self._node_health)]
 
     def state(self, now_s: float) -> State:
-        """What the graph is doing; a graph that stands still is never called running."""
+        """Return what the graph is doing; without new images it is never `RUNNING`."""
         silent_s = now_s - self._new_image_s
         if silent_s < STOPPED_AFTER_S and self._stamp_ns is not None:
             if reason := self.gate.get('reason'):
                 return State(RunState.HELD, f'the gate holds the head: {reason}')
-            return State(RunState.RUNNING, self._doing())
+            return State(RunState.RUNNING, self._activity())
         if self._stamp_ns is None and silent_s < STOPPED_AFTER_S:
             return State(RunState.WAITING, 'waiting for the first image')
         repeated = now_s - self._any_image_s < STOPPED_AFTER_S
-        if repeated and self._says('paused') == 'True':
+        if repeated and self._health_value('paused') == 'True':
             return State(RunState.PAUSED, 'the simulation is paused')
         return State(RunState.STOPPED, f'no new image for {silent_s:.0f} s')
 
-    def _doing(self) -> str:
+    def _activity(self) -> str:
         phase, source = self.gate.get('phase', ''), self.gate.get('source', '')
-        return _DOING.get((phase, source)) or _DOING.get((phase, ''), '')
+        return _ACTIVITIES.get((phase, source)) or _ACTIVITIES.get((phase, ''), '')
 
     def switches(self) -> dict[str, bool]:
-        """What is known to be on or off, by the service that switches it."""
-        said = {'enable': self.gate.get('enabled', ''), 'sim/pause': self._says('paused')}
-        return {service: text == 'True' for service, text in said.items() if text}
+        """Return the known switches, on or off, by the service that sets them."""
+        texts = {'enable': self.gate.get('enabled', ''), 'sim/pause': self._health_value('paused')}
+        return {service: text == 'True' for service, text in texts.items() if text}
 
     def facts(self) -> dict[str, str]:
-        """What to read, in this order; what is not known is left out."""
+        """Return the figures of the page in their order, without the unknown ones."""
         facts = {
             'phase': self.gate.get('phase', '-'),
             'source': self.gate.get('source', '-'),
             'p(LM)': self.gate.get('p_lm', '-'),
             'trials': self.gate.get('trials', '-'),
-            'objects': self._says('objects'),
+            'objects': self._health_value('objects'),
         }
         recent = self.curve.rate(slice(-WINDOW_TRIALS, None))
         if recent.trials:
@@ -229,14 +229,14 @@ class ViewModel:
         return {name: text for name, text in facts.items() if text}
 
     def curve_points(self, now_s: float) -> CurvePoints:
-        """The success curve, drawn anew once a second; the same object while nothing is new."""
-        news = self.curve.records and self._points.trials[-1:] != [len(self.curve.records)]
-        if news and now_s - self._drawn_s >= _CURVE_EVERY_S:
+        """Return the success curve, updated at most once a second; else the same object."""
+        changed = self.curve.records and self._points.trials[-1:] != [len(self.curve.records)]
+        if changed and now_s - self._drawn_s >= _CURVE_EVERY_S:
             self._points, self._drawn_s = CurvePoints.of(self.curve), now_s
         return self._points
 
-    def _says(self, key: str) -> str:
-        return next((o.values[key] for o in self._lights.values() if key in o.values), '')
+    def _health_value(self, key: str) -> str:
+        return next((h.values[key] for h in self._node_health.values() if key in h.values), '')
 
 
 def _wilson(

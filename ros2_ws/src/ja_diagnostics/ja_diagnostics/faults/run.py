@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ja_common.private_executor import own_executor
+from ja_common.private_context import private_executor
 from ja_common.ros_arguments import parameter_arguments
 from ja_diagnostics.faults.catalogue import Fault, Graph, faults
 from ja_diagnostics.faults.relay import AROUND, Relay
@@ -101,7 +101,7 @@ class FaultRun:
 
     def run(self, chosen: Sequence[Fault]) -> int:
         """Run these faults in turn; return the exit code of the graph."""
-        with own_executor() as executor:
+        with private_executor() as executor:
             watcher = Watcher(context=executor.context)
             relay = Relay(context=executor.context)
             executor.add_node(watcher)

@@ -1,4 +1,4 @@
-"""Any learner of this project in the Gymnasium world: eyes and learning module around it."""
+"""Any learner of this project in the Gymnasium world, with perception and pipeline around it."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from ja_common.core.detection import most_salient
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_common.core.stamps import NS_PER_S
 from ja_control.core.visual_feedback import visual_feedback
-from ja_experiments.agents.robot import Learner, OnlineLearner
+from ja_experiments.agents.robot import OnlineLearner
 from ja_learning.core.evaluator import EvaluatorConfig
+from ja_learning.core.learner import TrainablePredictor
 from ja_learning.core.look_around import LookAroundConfig
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.detector import SalientFeatureDetector
@@ -25,7 +26,7 @@ class GymAgent:
     `p_lm`: how often it follows the learner; else it turns to what is most salient (Eq. 2).
     """
 
-    def __init__(self, learner: Learner, p_lm: float, seed: int) -> None:
+    def __init__(self, learner: TrainablePredictor, p_lm: float, seed: int) -> None:
         self.p_lm = p_lm
         self._rng = np.random.default_rng(seed)
         self._detector = SalientFeatureDetector(BlazeFace())
@@ -35,14 +36,14 @@ class GymAgent:
         self._stamp_ns = 0
 
     def act(self, observation: dict[str, NDArray], info: dict[str, Any]) -> NDArray[np.float64]:
-        """Change of posture (2,) [rad]; what is fixated meanwhile is learned from."""
+        """Return a change of posture (2,) [rad]; learn from the trials that end meanwhile."""
         # The observation is taken at rest, one second after the other: there is no ego-motion.
         self._stamp_ns += NS_PER_S
         posture = Posture(self._stamp_ns, observation['posture'].astype(float), np.zeros(2))
         image = observation['image']
         camera = CameraModel(image.shape[1], image.shape[0], *info['camera'])
         percept = self._detector.detect(image, self._stamp_ns, camera, posture)
-        proposal, _ = self._online_learner.live(percept.detections, percept.face_image, posture)
+        proposal, _ = self._online_learner.step(percept.detections, percept.face_image, posture)
         if proposal.delta is not None and self._rng.random() < self.p_lm:
             return proposal.delta
         salient = most_salient(percept.detections)

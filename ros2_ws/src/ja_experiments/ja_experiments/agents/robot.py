@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,21 +15,14 @@ from ja_control.core.joint_limits import JointLimits
 from ja_control.core.visual_feedback import visual_feedback
 from ja_experiments.config import ExperimentConfig
 from ja_learning.core.evaluator import EvaluatorConfig, InternalEvaluator
-from ja_learning.core.learner import Predictor
-from ja_learning.core.learning_module import LearningModule, Proposal
+from ja_learning.core.learner import TrainablePredictor
 from ja_learning.core.look_around import LookAroundConfig
 from ja_learning.core.trial import Trial
-
-
-class Learner(Predictor, Protocol):
-    """What the robot asks of its learner."""
-
-    def learn(self, trial: Trial) -> None:
-        """Learn from one trial."""
+from ja_learning.core.trial_pipeline import Proposal, TrialPipeline
 
 
 class FixedTurn:
-    """In the learner's place: wherever the head is, and whatever the face, the same turn."""
+    """A learner that learns nothing: the same turn from every posture, for every face."""
 
     log_evidence = 0.0
 
@@ -47,24 +39,19 @@ class FixedTurn:
     ) -> NDArray[np.float64]:
         return np.tile(np.asarray(face_at, float) + self._turn, (count, 1))
 
-    def log_density(
-        self, faces: ArrayLike, face_at: ArrayLike, directions: ArrayLike
-    ) -> NDArray[np.float64]:
-        return np.zeros((len(np.asarray(faces)), len(np.asarray(directions))))
-
-    def learn(self, trial: Trial) -> None:
+    def update(self, trial: Trial) -> None:
         pass
 
 
 class OnlineLearner:
-    """A learner that lives: asked on every image, and taught the trials that it makes of them.
+    """A learner, the trial pipeline and the internal evaluator: image by image, update by update.
 
     `taught`: as in `TaskConfig`.
     """
 
     def __init__(
         self,
-        learner: Learner,
+        learner: TrainablePredictor,
         look_around: LookAroundConfig,
         evaluator: EvaluatorConfig,
         still_below_rad_s: float,
@@ -73,31 +60,36 @@ class OnlineLearner:
     ) -> None:
         self._learner = learner
         self._evaluator = InternalEvaluator(evaluator)
-        self._module = LearningModule(lambda: learner, look_around, still_below_rad_s, seed)
+        self._pipeline = TrialPipeline(
+            lambda: learner, self._update, look_around, still_below_rad_s, seed
+        )
         self._taught = taught
 
-    def live(
+    def step(
         self, detections: list[Detection], face: NDArray[np.uint8] | None, posture: Posture
     ) -> tuple[Proposal, NDArray[np.float64] | None]:
-        """One image: what the learner proposes, and the direction (2,) [rad] that is fixated."""
+        """Process one image: return the proposal, and the direction (2,) [rad] fixated, or None.
+
+        `face`: the picture of the attended face, uint8 (30, 25), or None.
+        """
         rays = [seen.ray for seen in objects(detections)]
-        hers = caregiver_face(detections)
-        attended = None if face is None or hers is None else (face, hers.ray)
-        proposal = self._module.see(posture, np.reshape(rays, (-1, 2)), attended)
+        seen = caregiver_face(detections)
+        attended = None if face is None or seen is None else (face, seen.ray)
+        proposal = self._pipeline.process_image(posture, np.reshape(rays, (-1, 2)), attended)
         fixation = self._evaluator.fixation(detections, posture)
-        if proposal.given_up is not None:
-            self._learner.learn(proposal.given_up)
-        trial = None if fixation is None else self._module.fixate(posture, fixation)
-        if trial is not None:
-            if self._taught == 'executed':
-                trial = replace(trial, fixation=posture.position)
-            self._learner.learn(trial)
+        if fixation is not None:
+            self._pipeline.process_fixation(posture, fixation)
         return proposal, fixation
+
+    def _update(self, trial: Trial, posture: Posture) -> None:
+        if trial.fixation is not None and self._taught == 'executed':
+            trial = replace(trial, fixation=posture.position)
+        self._learner.update(trial)
 
 
 @dataclass(frozen=True)
 class Step:
-    """What the robot made of one image.
+    """What the robot decided on one image.
 
     `command`: the posture (2,) [rad] that the head is sent to. `fixation`: direction (2,) [rad] of
     the object in the centre, or None. `lm_delta`: what the learner proposed, (2,) [rad], or None.
@@ -113,7 +105,7 @@ class Robot:
     """Controller, learner, evaluator and gate; the head, the eyes and the world are not part."""
 
     def __init__(
-        self, config: ExperimentConfig, learner: Learner, rng: np.random.Generator
+        self, config: ExperimentConfig, learner: TrainablePredictor, rng: np.random.Generator
     ) -> None:
         self._config = config
         self._cycle = AttentionCycle(config.cycle, Gating(config.gating), rng)
@@ -130,8 +122,11 @@ class Robot:
     def step(
         self, detections: list[Detection], face: NDArray[np.uint8] | None, posture: Posture
     ) -> Step:
-        """One image, as detections and the picture of the attended `face`, uint8 (30, 25)."""
-        proposal, fixation = self._online_learner.live(detections, face, posture)
+        """Process one image: its detections, and the picture of the attended `face`, or None.
+
+        `face`: uint8 (30, 25).
+        """
+        proposal, fixation = self._online_learner.step(detections, face, posture)
         percept = CycleInput(
             posture,
             face_delta=self._feedback(caregiver_face(detections)),

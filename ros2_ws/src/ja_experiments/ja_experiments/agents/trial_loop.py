@@ -1,4 +1,4 @@
-"""The life of one robot in the simulated task: trial after trial, through the cores of the nodes.
+"""One robot in the simulated task: trial after trial, through the cores of the nodes.
 
 One image at a time, with any learner, any gate and any way of looking around.
 """
@@ -11,18 +11,19 @@ from ja_common.core.geometry import angle_between
 from ja_common.core.posture import Posture
 from ja_common.core.stamps import NS_PER_S
 from ja_control.core.attention_cycle import Phase
-from ja_experiments.agents.robot import Learner, Robot
+from ja_experiments.agents.robot import Robot
 from ja_experiments.config import IMAGE_PERIOD_S, ExperimentConfig
 from ja_experiments.datasets.looks import Looks
 from ja_experiments.paper.outcomes import Outcomes
 from ja_experiments.paper.task import ATTENDED, Setting, SimulatedTask
+from ja_learning.core.learner import TrainablePredictor
 from ja_sim.core.specs import ObjectsSpec
 
 _OF_A_TRIAL = (Phase.GLANCE, Phase.SHIFT)
 
 
 class TrialLoop:
-    """One robot, from untrained on.
+    """One robot, from initial weights on.
 
     `p_lm`: of every trial so far, the probability with which the gate followed the learner.
     `images`: how many were taken.
@@ -33,7 +34,7 @@ class TrialLoop:
         config: ExperimentConfig,
         places: ObjectsSpec,
         looks: Looks,
-        learner: Learner,
+        learner: TrainablePredictor,
         seed: int,
     ) -> None:
         self._rng = np.random.default_rng(seed)
@@ -45,16 +46,16 @@ class TrialLoop:
         self.move_to(looks)
 
     def move_to(self, looks: Looks) -> None:
-        """From here on the world is that of other looks: another caregiver, or another camera."""
+        """Change the world to that of other looks: another caregiver, or another camera."""
         config = self._config
         self._looks = looks
         self._task = SimulatedTask(config.task, config.interest, self._places, looks)
 
     def run(self, trials: int) -> Outcomes:
-        """The next so many trials."""
+        """Run the next so many trials, and return their outcomes."""
         outcomes = Outcomes.blank(trials)
         for trial in range(trials):
-            self._run_trial(self._task.draw(self._rng), outcomes, trial)
+            self._run_trial(self._task.draw_setting(self._rng), outcomes, trial)
         return outcomes
 
     def _run_trial(self, setting: Setting, outcomes: Outcomes, trial: int) -> None:

@@ -1,1 +1,1 @@
-"""Looks at the caregiver: rendered, recorded, kept on disk."""
+"""Looks at the caregiver: rendered, recorded, cached on disk."""

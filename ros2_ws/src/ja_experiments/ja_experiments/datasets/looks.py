@@ -1,9 +1,9 @@
-"""Looks at the caregiver: the data sets of section 3.1, rendered once and kept.
+"""Looks at the caregiver: the data sets of section 3.1, rendered once and cached.
 
 The robot looks at the caregiver of the rendered world, waits for her gaze, looks aside, and looks
-again; the picture of her face comes from the detector and the crop of the live graph. Where the
-attended object stands is the world's truth: the experiment places the object there, and the
-learner is never told.
+again. The picture of her face comes from the detector and the crop of the live graph. The
+direction of the attended object is the truth of the world. The experiment places the object there;
+the learner never receives it.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from ja_sim.core.scene import load_scene
 from ja_sim.core.world import JointAttentionWorld
 
 POOL = 125
-"""How many data sets the paper learns from."""
+"""Number of data sets that the paper learns from."""
 FRESH = 1000
-"""How many more looks at the same person there are to test on."""
+"""Number of further looks at the same person, for tests."""
 IMAGE_SIZE = (320, 240)
 _ASIDE_RAD = (0.35, 0.0)
 _MADE_BY = ('ja_common', 'ja_perception', 'ja_control', 'ja_sim')
@@ -45,12 +45,11 @@ _FILES = ('.py', '.npz', '.png', '.xml', '.yaml', '.tflite')
 
 @dataclass(frozen=True)
 class Looks:
-    """What was seen of the caregiver's face, and where the thing was that she looked at.
+    """Pictures of the caregiver's face, and directions of the object that she looked at.
 
     `faces`: uint8 (n, 30, 25), seen in the directions `faces_at`, (n, 2) [rad]. `postures`: (n, 2)
-    [rad], of the head that looked at her.
-    `directions`: (n, 2) [rad], of the object that she attended to (the paper's motor command is
-    what is between the two).
+    [rad], of the head at the look. `directions`: (n, 2) [rad], of the attended object. The paper's
+    motor command is the difference `directions - postures`.
     """
 
     faces: NDArray[np.uint8]
@@ -65,35 +64,42 @@ class Looks:
         return Looks(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
+Render = Callable[[str, int, int, Callable[[int], None]], Looks]
+"""Makes looks of (scene, seed, count, progress)."""
+
+
 def load_looks(
     scene: str = 'default',
     seed: int = 0,
     count: int = POOL + FRESH,
     folder: Path | None = None,
-    say: Callable[[str], None] = print,
+    report: Callable[[str], None] = print,
     progress: Callable[[int], None] = lambda more: None,
+    render: Render | None = None,
 ) -> Looks:
-    """Looks at the caregiver that `seed` makes of a scene, from `folder` or newly rendered.
+    """Return looks at the caregiver of a scene and seed, from `folder` or newly rendered.
 
-    What is kept is used only if its checksum is right and if nothing has changed that it was
-    made by: scene, seed, sources of the sim and of the perception, libraries.
+    Cached looks are used only if their checksum is right and if what made them is unchanged:
+    scene, seed, sources of the sim and of the perception, libraries. `report` receives one line
+    when looks are rendered, `progress` the number of looks that are finished since its last call.
+    `render`: makes the looks of (scene, seed, count, progress); None: the rendered world.
     """
     kept = (folder or cache_folder()) / f'looks-{Path(scene).stem}-{seed}-{count}'
     maker = _maker(scene, seed, count)
     try:
         looks = _read(kept, maker)
     except _NotUsableError as why:
-        say(f'Rendering {count} looks at the caregiver ({why}).')
+        report(f'Rendering {count} looks at the caregiver ({why}).')
     else:
         progress(count)
         return looks
-    looks = _render(scene, seed, count, progress)
+    looks = (render or _render)(scene, seed, count, progress)
     _write(kept, maker, looks)
     return looks
 
 
 class _NotUsableError(Exception):
-    """Why looks must be rendered again."""
+    """The cached looks cannot be used; the message gives the reason."""
 
 
 def _read(kept: Path, maker: dict[str, Any]) -> Looks:
@@ -101,7 +107,7 @@ def _read(kept: Path, maker: dict[str, Any]) -> Looks:
         manifest = json.loads((kept / 'manifest.json').read_text(encoding='utf-8'))
         data = (kept / 'looks.npz').read_bytes()
     except FileNotFoundError:
-        raise _NotUsableError(f'none are kept in {kept}') from None
+        raise _NotUsableError(f'none are cached in {kept}') from None
     except (OSError, ValueError) as error:
         raise _NotUsableError(f'those in {kept} cannot be read: {error}') from None
     if not isinstance(manifest, dict) or manifest.get('sha256') != _sha256([data]):
@@ -109,13 +115,13 @@ def _read(kept: Path, maker: dict[str, Any]) -> Looks:
     made_by = manifest.get('made_by', {})
     changed = [key for key, value in maker.items() if made_by.get(key) != value]
     if changed:
-        raise _NotUsableError(f'those in {kept} were made by other {", ".join(changed)}')
+        raise _NotUsableError(f'those in {kept} were made with other {", ".join(changed)}')
     with np.load(kept / 'looks.npz', allow_pickle=False) as arrays:
         return Looks(**{field.name: arrays[field.name] for field in fields(Looks)})
 
 
 def _write(kept: Path, maker: dict[str, Any], looks: Looks) -> None:
-    """Write all or nothing: two processes may be at it."""
+    """Write the folder in one atomic step: two processes may write it at the same time."""
     made = kept.with_name(f'.{kept.name}.{os.getpid()}')
     made.mkdir(parents=True)
     np.savez_compressed(made / 'looks.npz', **vars(looks))
@@ -130,7 +136,7 @@ def _write(kept: Path, maker: dict[str, Any], looks: Looks) -> None:
 
 
 def _maker(scene: str, seed: int, count: int) -> dict[str, Any]:
-    """All that the looks depend on."""
+    """Return everything that the looks depend on."""
     return {
         'scene': repr(load_scene(scene)),
         'seed': seed,
@@ -141,10 +147,10 @@ def _maker(scene: str, seed: int, count: int) -> dict[str, Any]:
 
 
 def _sources() -> Iterator[bytes]:
-    """Core modules and data of the packages that make a look, and this module's own procedure."""
+    """Yield the core modules and data that make a look, and the modules of its procedure."""
     for package in _MADE_BY:
         root = Path(str(resources.files(package)))
-        # Nodes pass the looks on without a part in them.
+        # The nodes take no part in rendering.
         for path in sorted(p for p in root.rglob('*') if p.suffix in _FILES):
             if path.parent != root:
                 yield path.relative_to(root).as_posix().encode()
@@ -162,7 +168,7 @@ def _sha256(chunks: Iterator[bytes] | list[bytes]) -> str:
 
 
 def _render(scene: str, seed: int, count: int, progress: Callable[[int], None]) -> Looks:
-    """Look at her, wait, look aside, and again."""
+    """Render looks: look at the caregiver, wait, look aside, and repeat."""
     config = ExperimentConfig().with_settings(
         {'dwell_s': DWELL_S, 'max_shifts': 1, 'gating': 'constant', 'p_lm_max': 1.0}
     )
@@ -178,7 +184,7 @@ def _render(scene: str, seed: int, count: int, progress: Callable[[int], None]) 
             sight = task.advance()
             watched = sight.step.decision.phase is Phase.SHIFT
             face, picture = caregiver_face(sight.percept.detections), sight.percept.face_image
-            # She may not have noticed that the robot looked away: then it is the same look.
+            # If she did not notice that the robot looked away, it is the same look.
             if not watched or face is None or picture is None:
                 continue
             if sight.truth.trial > trial:

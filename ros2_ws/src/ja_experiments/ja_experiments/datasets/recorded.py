@@ -1,4 +1,4 @@
-"""Recorded looks in place of rendered ones: the paper's experiment on a data set of trials."""
+"""Make looks from a data set of recorded trials, in place of rendered looks."""
 
 from __future__ import annotations
 
@@ -20,54 +20,55 @@ from ja_sim.core.specs import ObjectsSpec
 _KNOWN_BY = {
     'label': "a person's label",
     'truth': 'the truth of a simulation',
-    'fixation': 'nothing but what the robot fixated, which may be another object',
+    'fixation': 'only the object that the robot fixated, which may be another object',
 }
-# Of a data set that is smaller than the paper's and a test set.
+# Used for a data set that is smaller than the paper's pool and a test set together.
 _LEARNED_SHARE = 0.8
 
 
 def recorded_materials(folder: Path, pool: int, scene: str) -> Materials:
-    """The looks of a data set, the first `pool` of them to learn from, the rest to test on.
+    """Return the looks of a data set: the first `pool` to learn from, the rest to test on.
 
-    `pool` 0: `POOL`, or four fifths of what there is. Other objects are placed as in the scene,
-    around where the head looked at her, and wherever anything was recorded. Raises ConfigError
-    when nothing would be left to test on.
+    `pool` 0: `POOL`, or four fifths of all looks. Other objects are placed as `places_around`
+    computes. Raises ConfigError when fewer than two looks are left to test on.
     """
     samples = read_dataset(folder)
-    looks = looks_of(samples)
+    looks = looks_from_samples(samples)
     pool = pool or min(POOL, int(_LEARNED_SHARE * len(looks)))
     if not 1 < pool < len(looks) - 1:
         raise ConfigError(
-            f'{folder} has {len(looks)} trials: with {pool} to learn from, two at least must be '
+            f'{folder} has {len(looks)} trials: with {pool} to learn from, at least two must be '
             'left to test on; name another --pool, or record more'
         )
     known = Counter(sample.target[0] for sample in samples)
-    told = '; '.join(f'{known[by]} by {text}' for by, text in _KNOWN_BY.items() if known[by])
+    sources = '; '.join(f'{known[by]} by {text}' for by, text in _KNOWN_BY.items() if known[by])
     origin = (
         f'recorded looks of {len(looks)} (`{folder.name}`), in the order in which they were '
-        f'recorded. What she meant is known, of all of them: {told}'
+        f'recorded. The attended object is known: {sources}'
     )
-    return Materials.of(looks, places_around(looks, load_scene(scene).objects), origin, pool)
+    return Materials.from_looks(
+        looks, places_around(looks, load_scene(scene).objects), origin, pool
+    )
 
 
-def looks_of(samples: Sequence[TrialSample]) -> Looks:
-    """The data sets of the paper's experiment: faces, and where the thing was that she meant."""
+def looks_from_samples(samples: Sequence[TrialSample]) -> Looks:
+    """Return the faces and attended directions of recorded trials as looks."""
     return Looks(
-        np.array([sample.lesson.face for sample in samples]).reshape(-1, *FACE_SHAPE),
-        np.array([sample.lesson.face_at for sample in samples]).reshape(-1, 2),
-        np.array([sample.lesson.postures[0] for sample in samples]).reshape(-1, 2),
+        np.array([sample.trial.face for sample in samples]).reshape(-1, *FACE_SHAPE),
+        np.array([sample.trial.face_at for sample in samples]).reshape(-1, 2),
+        np.array([sample.trial.postures[0] for sample in samples]).reshape(-1, 2),
         np.array([sample.target[1] for sample in samples]).reshape(-1, 2),
     )
 
 
 def places_around(looks: Looks, places: ObjectsSpec) -> ObjectsSpec:
-    """The scene's places seen from where she was looked at, and wide enough for all she meant."""
+    """Return the scene's ranges, moved to the median look, and wide enough for every direction."""
     centre = np.degrees(np.median(looks.postures, axis=0))
-    meant = np.degrees(looks.directions)
+    attended = np.degrees(looks.directions)
 
     def widened(place: tuple[float, float], axis: int) -> tuple[float, float]:
         low, high = np.add(place, centre[axis])
-        return float(min(low, *meant[:, axis])), float(max(high, *meant[:, axis]))
+        return float(min(low, *attended[:, axis])), float(max(high, *attended[:, axis]))
 
     return replace(
         places, pan_deg=widened(places.pan_deg, 0), tilt_deg=widened(places.tilt_deg, 1)

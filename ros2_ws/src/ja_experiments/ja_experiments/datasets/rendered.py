@@ -16,12 +16,12 @@ from ja_sim.core.world import JointAttentionWorld, WorldTruth
 
 IMAGE_PERIOD_S = 0.1
 DWELL_S = 0.5
-"""How long to watch the face: it shows where she looks after her reaction and her turn."""
+"""Time [s] to look at the face: long enough for her reaction and her turn."""
 
 
 @dataclass(frozen=True)
 class RenderedStep:
-    """One image, and what was made of it. `truth` is for whoever scores or draws, not to learn."""
+    """One image and its processing. `truth` is for scores and figures, never for the learner."""
 
     image: NDArray[np.uint8]
     camera: CameraModel
@@ -32,14 +32,14 @@ class RenderedStep:
 
 
 class RenderedTask:
-    """Joins a world, the eyes and a robot; one `advance` an image."""
+    """Connects a world, a detector and a robot; one `advance` processes one image."""
 
     def __init__(self, world: JointAttentionWorld, robot: Robot) -> None:
         self._world, self._robot = world, robot
         self._detector = SalientFeatureDetector(BlazeFace())
 
     def advance(self) -> RenderedStep:
-        """Let the head follow the last command, take a picture, and act on it."""
+        """Step the world by one image period, take a picture, and command the head."""
         self._world.step(IMAGE_PERIOD_S)
         seen, joints, truth = self._world.observe(), self._world.joint_state(), self._world.truth()
         posture = Posture(seen.stamp_ns, joints.position, joints.velocity)

@@ -1,8 +1,8 @@
-"""One condition of the experiment, over several seeds: learning, and tests on the way.
+"""Run conditions of the experiment over several seeds: learning, with tests in between.
 
-Online success is what the robot achieves while it learns, with the gate as it then stands. What
-the learner alone can do is tested apart: nothing is learned, every shift follows the network, on
-looks of the pool and on fresh ones.
+Online success is the success of the robot while it learns, with the current gate. The learner
+alone is tested separately: it does not learn, and every shift follows the network, on looks of the
+pool and on fresh ones.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ TRIALS = 300_000
 SEEDS = 10
 BLOCKS = 30
 STAGES = {'I': 2, 'II': 12, 'III': 27}
-"""The blocks, of 10^4 trials each, that Figure 6 looks into: 2-3, 12-13 and 27-28 x 10^4."""
+"""The blocks, of 10^4 trials each, that Figure 6 shows: 2-3, 12-13 and 27-28 x 10^4."""
 LEARNER_ALONE = {'gating': 'constant', 'p_lm_max': 1.0}
 _TEST_SEED = 1_000_000
 
 
 @dataclass(frozen=True)
 class Materials:
-    """What all runs share: looks to learn from and to test on, and where objects are placed.
+    """What all runs share: looks to learn from and to test on, and the ranges of the objects.
 
-    `origin`: where the looks come from, for people.
+    `origin`: the source of the looks, as a sentence for the report.
     """
 
     pool: Looks
@@ -46,16 +46,16 @@ class Materials:
     origin: str = ''
 
     @classmethod
-    def of(
+    def from_looks(
         cls, looks: Looks, places: ObjectsSpec, origin: str = '', pool: int = POOL
     ) -> Materials:
-        """The first `pool` looks are learned from, the others are for tests."""
+        """Split looks: the first `pool` are learned from, the others are for tests."""
         return cls(looks[:pool], looks[pool:], places, origin)
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How long, how often, how closely watched."""
+    """Number of trials in a run, seeds, and number of trials in a test."""
 
     trials: int = TRIALS
     seeds: tuple[int, ...] = tuple(range(SEEDS))
@@ -63,11 +63,11 @@ class Plan:
 
     @property
     def block(self) -> int:
-        """Trials a block."""
+        """Return the number of trials in a block."""
         return self.trials // BLOCKS
 
-    def of(self, config: ExperimentConfig) -> ExperimentConfig:
-        """The configuration with the gate at the same place relative to a run of this length."""
+    def scale_gate(self, config: ExperimentConfig) -> ExperimentConfig:
+        """Return the configuration with the gate's sigmoid scaled to the length of the run."""
         gating, share = config.gating, self.trials / TRIALS
         scaled = replace(
             gating,
@@ -79,7 +79,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Run:
-    """What one seed has given.
+    """The results of one seed.
 
     `alone`: outcomes of the learner alone, by stage (`I`, `II`, `III`, `end`) and by the looks
     tested on (`pool`, `fresh`). `explained`: (blocks, 2, 2), the share of the variance of the
@@ -103,24 +103,30 @@ class Condition:
 
     @cached_property
     def curve(self) -> NDArray[np.float64]:
-        """Online success by seed and block, (seeds, blocks)."""
+        """Return online success by seed and block, (seeds, blocks)."""
         success = np.array([run.online.success[: BLOCKS * self.plan.block] for run in self.runs])
         return success.reshape(len(self.runs), BLOCKS, self.plan.block).mean(axis=2)
 
     def online(self, block: int, in_view: bool | None = None) -> NDArray[np.float64]:
-        """Online success of every seed in one block, (seeds,), of all trials or of some."""
+        """Return online success of every seed in one block, (seeds,).
+
+        `in_view`: only trials whose attended object was in view of the look, or was not.
+        """
         size = self.plan.block
         first = (block % BLOCKS) * size
         return _shares([run.online[first : first + size] for run in self.runs], in_view)
 
     def alone(self, stage: str, looks: str, in_view: bool | None = None) -> NDArray[np.float64]:
-        """Success of every seed's learner alone, (seeds,), after a stage, on some looks."""
+        """Return success of every seed's learner alone, (seeds,), after a stage.
+
+        `looks`: `pool` or `fresh`; `in_view`: as in `online`.
+        """
         return _shares([run.alone[stage][looks] for run in self.runs], in_view)
 
 
 def _shares(outcomes: Sequence[Outcomes], in_view: bool | None) -> NDArray[np.float64]:
     chosen = [o.success if in_view is None else o.success[o.in_view == in_view] for o in outcomes]
-    # A recorded person may never have meant anything out of view.
+    # A recorded person may never have attended to anything out of view.
     return np.array([success.mean() if len(success) else np.nan for success in chosen])
 
 
@@ -131,21 +137,22 @@ def run_conditions(
     workers: int | None = None,
     progress: Callable[[int], None] = lambda trials: None,
 ) -> dict[str, Condition]:
-    """Every configuration with every seed of the plan, on all cores (the kernel frees the GIL).
+    """Run every configuration with every seed of the plan, on all cores; return the conditions.
 
-    `progress` is told, from any thread, how many trials more have been run.
+    The kernel releases the GIL, so threads suffice. `progress` receives, from any thread, the
+    number of trials run since its last call. An error in it ends all runs and is raised.
     """
     results: dict[str, dict[int, Run]] = {name: {} for name in configs}
     stop = Event()
 
-    def tell(trials: int) -> None:
+    def report_progress(trials: int) -> None:
         if stop.is_set():
             raise CancelledError
         progress(trials)
 
     with ThreadPoolExecutor(workers or os.cpu_count()) as threads:
         jobs = {
-            threads.submit(run_seed, config, plan, materials, seed, tell): (name, seed)
+            threads.submit(run_seed, config, plan, materials, seed, report_progress): (name, seed)
             for name, config in configs.items()
             for seed in plan.seeds
         }
@@ -170,13 +177,13 @@ def run_seed(
     seed: int,
     progress: Callable[[int], None] = lambda trials: None,
 ) -> Run:
-    """One robot's life: learn in blocks, look at what the network knows, test it at each stage."""
-    experiment = FastExperiment(plan.of(config), materials.places, materials.pool, seed)
+    """Run one seed: learn in blocks, measure the explained variance, test after each stage."""
+    experiment = FastExperiment(plan.scale_gate(config), materials.places, materials.pool, seed)
     tested = {
         'pool': prepare(materials.pool, config),
         'fresh': prepare(materials.fresh, config),
     }
-    # In the tests the caregiver is reliable: what is asked is what the network has learned.
+    # The caregiver of the tests is reliable: the tests measure the network, not the caregiver.
     test_config = config.with_settings({**LEARNER_ALONE, 'reliability': 1.0})
     online, alone, explained = [], {}, []
     for block in range(BLOCKS):
@@ -197,9 +204,9 @@ def _stages_after(block: int) -> list[str]:
 
 
 def _explained(experiment: FastExperiment, looks: PreparedLooks) -> NDArray[np.float64]:
-    """Share of the variance of the right commands that is explained, (2,): pan, tilt."""
+    """Return the explained share of the variance of the right commands, (2,): pan, tilt."""
     right = looks.directions - looks.postures
-    wrong = experiment.answers(looks) - right
+    wrong = experiment.predict(looks) - right
     return 1 - (wrong**2).mean(axis=0) / right.var(axis=0)
 
 

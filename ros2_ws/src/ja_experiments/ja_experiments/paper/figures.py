@@ -1,4 +1,4 @@
-"""The pictures of the report: Figures 6 (a) to (c) of the paper, and what else was asked."""
+"""Draw the figures of the report: Figures 6 (a) to (c) of the paper, and further ones."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ja_common.core.statistics import band_over_seeds, over_seeds
 from ja_control.core.gating import Gating
 from ja_experiments.paper.experiment import BLOCKS, STAGES, Condition
 
-# Okabe and Ito's colours, which all people can tell apart.
+# The colours of Okabe and Ito, which colour-blind people can tell apart.
 BLUE, ORANGE, GREEN, PURPLE, SKY, GREY = (
     '#0072B2', '#D55E00', '#009E73', '#CC79A7', '#56B4E9', '#666666',
 )  # fmt: skip
@@ -24,18 +24,18 @@ PICTURE_DPI = 160
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure, size in inches, that no window system is needed for."""
+    """Return an empty figure, size in inches, that needs no window system."""
     figure = Figure(figsize=(width, height), layout='constrained', dpi=PICTURE_DPI)
     FigureCanvasAgg(figure)
     return figure
 
 
 def gating_function(conditions: Mapping[str, Condition]) -> Figure:
-    """Figure 6 (a): p(LM) over trials, for each reading."""
+    """Draw Figure 6 (a): p(LM) over trials, for each reading."""
     figure = new_figure(5.0, 2.6)
     axes = figure.add_subplot()
     for (name, condition), colour in zip(conditions.items(), (BLUE, ORANGE), strict=False):
-        gating = Gating(condition.plan.of(condition.config).gating)
+        gating = Gating(condition.plan.scale_gate(condition.config).gating)
         trials = np.linspace(0, condition.plan.trials, 301)
         p_lm = [gating.p_lm(int(trial)) for trial in trials]
         axes.plot(_ten_thousands(trials), p_lm, color=colour, label=f'pairs: {name}')
@@ -46,7 +46,7 @@ def gating_function(conditions: Mapping[str, Condition]) -> Figure:
 
 
 def success_over_time(by_objects: Mapping[str, Mapping[int, Condition]]) -> Figure:
-    """Figure 6 (b): online success for the object counts, a panel for each reading."""
+    """Draw Figure 6 (b): online success for the object counts, a panel for each reading."""
     figure = new_figure(9.0, 3.8)
     panels = figure.subplots(1, len(by_objects), sharey=True, squeeze=False)[0]
     for axes, (name, conditions) in zip(panels, by_objects.items(), strict=True):
@@ -64,7 +64,7 @@ def success_over_time(by_objects: Mapping[str, Mapping[int, Condition]]) -> Figu
 
 
 def attended_pan(condition: Condition, every: int = 50) -> Figure:
-    """Figure 6 (c): pan of what was attended at the three stages, for the first seed."""
+    """Draw Figure 6 (c): pan of the fixated object at the three stages, for the first seed."""
     figure = new_figure(9.0, 3.6)
     panels = figure.subplots(1, len(STAGES), sharey=True)
     online, size = condition.runs[0].online, condition.plan.block
@@ -100,7 +100,7 @@ def attended_pan(condition: Condition, every: int = 50) -> Figure:
 
 
 def pan_and_tilt(conditions: Mapping[str, Condition]) -> Figure:
-    """How much of the right pan and of the right tilt the network knows, on the pool."""
+    """Draw the explained variance of the right pan and tilt, on pool and fresh looks."""
     figure = new_figure(9.0, 3.2)
     panels = figure.subplots(1, len(conditions), sharey=True, squeeze=False)[0]
     for axes, (name, condition) in zip(panels, conditions.items(), strict=True):
@@ -121,7 +121,7 @@ def pan_and_tilt(conditions: Mapping[str, Condition]) -> Figure:
 
 
 def ablation_bars(variants: Mapping[str, Condition], title: str) -> Figure:
-    """Success at the end for every variant; the first is the one that the others change."""
+    """Draw success at the end for every variant; the first is the one that the others change."""
     figure = new_figure(7.5, 1.1 + 0.24 * len(variants))
     axes = figure.add_subplot()
     rows = np.arange(len(variants))
@@ -151,7 +151,7 @@ def ablation_bars(variants: Mapping[str, Condition], title: str) -> Figure:
 
 
 def frozen_stages(conditions: Mapping[str, Condition]) -> Figure:
-    """The learner alone as it was after every stage, on objects in and out of the first view."""
+    """Draw success of the learner alone after every stage, on objects in and out of view."""
     figure = new_figure(9.0, 3.0)
     panels = figure.subplots(1, len(conditions), sharey=True, squeeze=False)[0]
     places = np.arange(len(STAGES))
@@ -188,7 +188,7 @@ def _band(
     label: str,
     style: str = '-',
 ) -> None:
-    """A line through the blocks' middles, with its 95 % interval over seeds."""
+    """Draw a line through the middles of the blocks, with its 95 % interval over seeds."""
     mean, low, high = band_over_seeds(shares)
     middles = _ten_thousands((np.arange(BLOCKS) + 0.5) * condition.plan.block)
     axes.plot(

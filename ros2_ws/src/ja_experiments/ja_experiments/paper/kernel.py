@@ -1,11 +1,14 @@
 """The experiment of section 3 as one compiled loop over whole trials.
 
 It computes what `reference.py` computes, trial by trial, with the same draws in the same order
-from the same generator (Numba continues the very stream of a NumPy generator), and weights in
-float32 as the network of the nodes has them: the difference is the order of summation. A test
-holds the two together. The speed comes from compilation and from one fact: the face does not
-change within a trial, so that what a trial does to the many weights of the pixels is one pass over
-them, however many pairs it teaches (see `_learn`).
+from the same generator (Numba continues the stream of a NumPy generator), and weights in float32
+as in the network of the nodes. Only the order of summation differs; a test compares the two.
+
+Two things make it fast: compilation, and that the face does not change within a trial. All pairs
+of a trial therefore need one pass over the weights of the pixels (see `_update_weights`).
+
+The compiled functions and the tuples that they take stay in this one file: Numba's cache is
+invalidated only by changes of the file that holds the cached function.
 """
 
 from __future__ import annotations
@@ -67,7 +70,7 @@ class _Rules(NamedTuple):
 
 
 class PreparedLooks(NamedTuple):
-    """The looks as the kernel wants them; `vectors` are unit vectors to the face."""
+    """The looks in the form that the kernel takes; `vectors` are unit vectors to the face."""
 
     inputs: NDArray[np.float32]
     postures: NDArray[np.float64]
@@ -89,7 +92,7 @@ class _Weights(NamedTuple):
 
 
 class FastExperiment:
-    """One robot, from untrained on; drop-in for `ReferenceExperiment`, without the GIL."""
+    """One robot, from initial weights; equivalent to `ReferenceExperiment`, without the GIL."""
 
     def __init__(
         self, config: ExperimentConfig, places: ObjectsSpec, looks: Looks, seed: int
@@ -105,7 +108,7 @@ class FastExperiment:
 
     @property
     def network(self) -> ThreeLayerNetwork:
-        """The network as it is now."""
+        """Return the network with its current weights."""
         names = ('hidden_weights', 'hidden_biases', 'output_weights', 'output_biases')
         keys = (*names, *(f'momentum_{name}' for name in names))
         learned = dict(zip(keys, self._weights, strict=True))
@@ -114,19 +117,19 @@ class FastExperiment:
         return self._network
 
     def run(self, trials: int) -> Outcomes:
-        """The next so many trials."""
+        """Run the next so many trials; return their outcomes."""
         return self._run(trials, self._rules, self._looks, self._rng, learning=True)
 
     def test(
         self, config: ExperimentConfig, looks: PreparedLooks, trials: int, seed: int
     ) -> Outcomes:
-        """So many trials in which nothing is learned, on any looks and under another config."""
+        """Run trials without learning, on any looks and with any config; return their outcomes."""
         rng = np.random.default_rng(seed)
         return self._run(trials, _rules(config, self._places), looks, rng, learning=False)
 
-    def answers(self, looks: PreparedLooks) -> NDArray[np.float64]:
-        """What the network proposes at every look, (n, 2) [rad]."""
-        return _answers(self._rules, self._weights, looks)
+    def predict(self, looks: PreparedLooks) -> NDArray[np.float64]:
+        """Return the command that the network proposes at every look, (n, 2) [rad]."""
+        return _predict(self._rules, self._weights, looks)
 
     def _run(
         self,
@@ -196,7 +199,7 @@ def _rules(config: ExperimentConfig, places: ObjectsSpec) -> _Rules:
 
 
 def prepare(looks: Looks, config: ExperimentConfig) -> PreparedLooks:
-    """Make looks ready for tests; worth doing once, since every pixel is scaled."""
+    """Prepare looks for the kernel; do it once, because it scales every pixel."""
     return PreparedLooks(
         inputs=face_inputs(looks.faces, config.network.face_scaling).astype(np.float32),
         postures=looks.postures,
@@ -216,7 +219,7 @@ def _weights(network: ThreeLayerNetwork) -> _Weights:
 def _run_trials(  # type: ignore[no-untyped-def]
     rules, looks, weights, rng, trials_before, learning, fixated, in_view, pan_rad, shifts
 ):
-    """Run `len(fixated)` trials; returns how many of them were learned from."""
+    """Run `len(fixated)` trials; return the number of trials that were learned from."""
     vectors = np.empty((rules.objects, 3))
     directions = np.empty((rules.objects, 2))
     scores = np.empty(rules.objects)
@@ -256,14 +259,16 @@ def _run_trials(  # type: ignore[no-untyped-def]
         fixated[trial] = found
         pan_rad[trial] = directions[found, 0] - looks.postures[look, 0]
         if _same(rules, pan, tilt, postures[visited - 1]):
-            visited -= 1  # where the last shift ended, none began
+            visited -= 1  # no shift began where the last one ended
         if learning and visited:
             if rules.teach_executed:
                 end_pan, end_tilt = pan, tilt
             else:
                 end_pan, end_tilt = directions[found]
             first = 0 if rules.all_pairs else visited - 1
-            _learn(rules, weights, pixels, drive, postures[first:visited], end_pan, end_tilt)
+            _update_weights(
+                rules, weights, pixels, drive, postures[first:visited], end_pan, end_tilt
+            )
             learned += 1
     return learned
 
@@ -277,11 +282,11 @@ def _p_lm(rules, trials):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _draw_setting(rules, looks, rng, vectors, directions, scores):  # type: ignore[no-untyped-def]
-    """`SimulatedTask.draw`: the look's index; objects and their scores go into the arrays."""
+    """As `SimulatedTask.draw_setting`: return the index of the look; fill the arrays."""
     look = int(rng.random() * len(looks.postures))
-    told = rng.random() < rules.reliability
+    reliable = rng.random() < rules.reliability
     for index in range(rules.objects):
-        if index == ATTENDED and told:
+        if index == ATTENDED and reliable:
             directions[index] = looks.directions[look]
             _point(directions[index], vectors[index])
         else:
@@ -323,13 +328,13 @@ def _dot(a, b):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _head(pan, tilt):  # type: ignore[no-untyped-def]
-    """What `_ray` needs of a posture."""
+    """Return cosines and sines of a posture, for `_ray`."""
     return math.cos(pan), math.sin(pan), math.cos(tilt), math.sin(tilt)
 
 
 @njit(nogil=True)
 def _ray(head, vector):  # type: ignore[no-untyped-def]
-    """Ray (x, y) at which a vector is seen with the head in a posture; NaN if behind."""
+    """Return the ray (x, y) of a vector for a posture of the head; NaN if it is behind."""
     cp, sp, ct, st = head
     level = cp * vector[0] + sp * vector[1]
     forward = ct * level - st * vector[2]
@@ -342,7 +347,7 @@ def _ray(head, vector):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _visual_feedback(rules, pan, tilt, vectors, scores):  # type: ignore[no-untyped-def]
-    """Eq. 2 for the most salient object in view; no change when none is."""
+    """Compute Eq. 2 for the most salient object in view; (0, 0) when none is in view."""
     head = _head(pan, tilt)
     best = 0.0
     pan_delta = tilt_delta = 0.0
@@ -357,7 +362,7 @@ def _visual_feedback(rules, pan, tilt, vectors, scores):  # type: ignore[no-unty
 
 @njit(nogil=True)
 def _fixated(rules, pan, tilt, face, vectors, scores):  # type: ignore[no-untyped-def]
-    """Eq. 3: index of the object in the centre, or NOTHING (also when the face is nearer)."""
+    """Evaluate Eq. 3: index of the object in the centre; NOTHING if none, or if the face is."""
     head = _head(pan, tilt)
     found, nearest, best = NOTHING, math.inf, 0.0  # distances are squared
     for index in range(rules.objects):
@@ -382,7 +387,7 @@ def _same(rules, pan, tilt, posture):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True, fastmath=_FASTMATH)
 def _drive(matrix, pixels, drive):  # type: ignore[no-untyped-def]
-    """What the pixels alone contribute to each hidden unit."""
+    """Compute what the pixels alone contribute to each hidden unit."""
     for unit in range(len(drive)):
         total = np.float32(0)
         for index in range(len(pixels)):
@@ -413,24 +418,25 @@ def _propose(rules, weights, drive, pan, tilt):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True)
-def _answers(rules, weights, looks):  # type: ignore[no-untyped-def]
-    answers = np.empty((len(looks.inputs), 2))
+def _predict(rules, weights, looks):  # type: ignore[no-untyped-def]
+    commands = np.empty((len(looks.inputs), 2))
     drive = np.empty(len(weights.hidden), np.float32)
     for look in range(len(looks.inputs)):
         _drive(weights.hidden, looks.inputs[look], drive)
         pan, tilt = looks.postures[look]
-        answers[look] = _propose(rules, weights, drive, pan, tilt)
-    return answers
+        commands[look] = _propose(rules, weights, drive, pan, tilt)
+    return commands
 
 
 @njit(nogil=True)
-def _learn(rules, weights, pixels, drive, postures, end_pan, end_tilt):  # type: ignore[no-untyped-def]
-    """Back-propagation with momentum, one step a pair; the face is the same in all of them.
+def _update_weights(rules, weights, pixels, drive, postures, end_pan, end_tilt):  # type: ignore[no-untyped-def]
+    """Take one step of back-propagation with momentum for each pair; all have the same face.
 
     Every step k gives the momentum v of a hidden unit's pixel weights w a multiple of the same
     pixels x: v_k = mu v_(k-1) + d_k x, w_k = w_(k-1) - eta v_k. Hence v_k = mu^k v_0 + a_k x and
-    w_k = w_0 - eta (s_k v_0 + b_k x), and what the unit hears of the pixels, w_k . x, follows from
-    three sums over pixels taken once: the steps need numbers only, and w and v are written once.
+    w_k = w_0 - eta (s_k v_0 + b_k x), and the input of the unit from the pixels, w_k . x,
+    follows from three sums over pixels taken once. The steps need numbers only; w and v are
+    written once.
     """
     units = len(drive)
     mu, eta = rules.momentum, rules.learning_rate
@@ -441,8 +447,8 @@ def _learn(rules, weights, pixels, drive, postures, end_pan, end_tilt):  # type:
         wrong[0] = weights.output_bias[0] - (end_pan - pan) / rules.angle_scale
         wrong[1] = weights.output_bias[1] - (end_tilt - tilt) / rules.angle_scale
         for unit in range(units):
-            heard = drive[unit] - eta * (kept_sum * push[unit] + b[unit] * energy)
-            hidden[unit] = _hidden(rules, weights, unit, heard, pan, tilt)
+            pixel_input = drive[unit] - eta * (kept_sum * push[unit] + b[unit] * energy)
+            hidden[unit] = _hidden(rules, weights, unit, pixel_input, pan, tilt)
             for axis in range(2):
                 wrong[axis] += weights.output[axis, unit] * hidden[unit]
         kept *= mu
@@ -453,26 +459,32 @@ def _learn(rules, weights, pixels, drive, postures, end_pan, end_tilt):  # type:
             a[unit] = mu * a[unit] + delta
             b[unit] += a[unit]
             row, momentum = weights.hidden[unit], weights.hidden_momentum[unit]
-            _step(rules, row, momentum, -2, delta * _angle(rules, pan))
-            _step(rules, row, momentum, -1, delta * _angle(rules, tilt))
-            _step(rules, weights.hidden_bias, weights.hidden_bias_momentum, unit, delta)
+            _momentum_step(rules, row, momentum, -2, delta * _angle(rules, pan))
+            _momentum_step(rules, row, momentum, -1, delta * _angle(rules, tilt))
+            _momentum_step(rules, weights.hidden_bias, weights.hidden_bias_momentum, unit, delta)
             for axis in range(2):
                 gradient = wrong[axis] * hidden[unit]
-                _step(rules, weights.output[axis], weights.output_momentum[axis], unit, gradient)
+                _momentum_step(
+                    rules, weights.output[axis], weights.output_momentum[axis], unit, gradient
+                )
         for axis in range(2):
-            _step(rules, weights.output_bias, weights.output_bias_momentum, axis, wrong[axis])
-    _write(weights.hidden, weights.hidden_momentum, pixels, kept, a, -eta * kept_sum, -eta * b)
+            _momentum_step(
+                rules, weights.output_bias, weights.output_bias_momentum, axis, wrong[axis]
+            )
+    _write_pixel_weights(
+        weights.hidden, weights.hidden_momentum, pixels, kept, a, -eta * kept_sum, -eta * b
+    )
 
 
 @njit(nogil=True)
-def _step(rules, array, momentum, index, gradient):  # type: ignore[no-untyped-def]
+def _momentum_step(rules, array, momentum, index, gradient):  # type: ignore[no-untyped-def]
     momentum[index] = rules.momentum * momentum[index] + gradient
     array[index] -= rules.learning_rate * momentum[index]
 
 
 @njit(nogil=True, fastmath=_FASTMATH)
 def _products(momentum, pixels):  # type: ignore[no-untyped-def]
-    """Products with the pixels: of each unit's momentum, and of the pixels themselves."""
+    """Return the products of the pixels with each unit's momentum, and with themselves."""
     push = np.empty(len(momentum), np.float32)
     _drive(momentum, pixels, push)
     energy = np.float32(0)
@@ -482,8 +494,8 @@ def _products(momentum, pixels):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, fastmath=_FASTMATH)
-def _write(matrix, momentum, pixels, kept, a, momentum_share, pixel_share):  # type: ignore[no-untyped-def]
-    """w += momentum_share v + pixel_share x; v = kept v + a x, for every unit."""
+def _write_pixel_weights(matrix, momentum, pixels, kept, a, momentum_share, pixel_share):  # type: ignore[no-untyped-def]
+    """Set w += momentum_share v + pixel_share x; v = kept v + a x, for every unit."""
     kept, momentum_share = np.float32(kept), np.float32(momentum_share)
     for unit in range(len(matrix)):
         of_pixels, into_momentum = np.float32(pixel_share[unit]), np.float32(a[unit])

@@ -1,4 +1,4 @@
-"""What came of trials."""
+"""The outcomes of trials."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 NOTHING = -1
-"""Index of the fixated object in a trial that was given up."""
+"""Index of the fixated object in a trial without a fixation."""
 
 
 @dataclass(frozen=True)
 class Outcomes:
     """One entry a trial, in order.
 
-    `fixated`: int8, index of the object fixated at the end (0: the one that was meant).
-    `in_view`: was the meant object in view of the look at the caregiver? `pan_rad`: float32, pan
-    from the look to the fixated object, NaN when nothing was. `shifts`: int8.
+    `fixated`: int8, index of the object fixated at the end (0: the attended one). `in_view`: was
+    the attended object in view of the look at the caregiver? `pan_rad`: float32, pan [rad] from
+    the look to the fixated object, NaN without a fixation. `shifts`: int8, number of shifts.
     """
 
     fixated: NDArray[np.int8]
@@ -27,7 +27,7 @@ class Outcomes:
 
     @classmethod
     def blank(cls, trials: int) -> Outcomes:
-        """Room for the outcomes of so many trials."""
+        """Return empty outcomes of so many trials."""
         return cls(
             np.full(trials, NOTHING, np.int8),
             np.zeros(trials, bool),
@@ -45,5 +45,5 @@ class Outcomes:
 
     @property
     def success(self) -> NDArray[np.bool_]:
-        """Joint attention: was the object fixated that the caregiver meant?"""
+        """Return where joint attention succeeded: the attended object was fixated."""
         return self.fixated == 0

@@ -1,4 +1,4 @@
-"""The experiment of section 3, one image at a time, through the very cores of the nodes.
+"""The experiment of section 3, one image at a time, through the same cores as the nodes.
 
 This is the readable version; `kernel.py` computes the same, several hundred times faster.
 """
@@ -13,7 +13,7 @@ from ja_sim.core.specs import ObjectsSpec
 
 
 class ReferenceExperiment(TrialLoop):
-    """The life of a robot with the paper's network, which is `network`."""
+    """A trial loop with the paper's network, `network`."""
 
     def __init__(
         self, config: ExperimentConfig, places: ObjectsSpec, looks: Looks, seed: int

@@ -1,4 +1,4 @@
-"""All that `./ja figures` computes: both readings of the paper, and on demand the ablations."""
+"""Compute all of `./ja figures`: both readings of the paper, and the ablations on demand."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ import yaml
 from ja_experiments.config import READINGS, reading
 from ja_experiments.datasets.looks import FRESH, POOL, load_looks
 from ja_experiments.datasets.recorded import recorded_materials
+from ja_experiments.paper.episodes import Episode, record_episodes
 from ja_experiments.paper.experiment import Condition, Materials, Plan, run_conditions
-from ja_experiments.paper.strips import Episode, watch
-from ja_experiments.progress import Progress
+from ja_experiments.progress_bars import ProgressBars
 from ja_sim.core.scene import load_scene
 
 OBJECTS = (1, 3, 5, 10)
 FEATURED_OBJECTS = 5
-"""The count that Figures 6 (c) and 7, the stages and the ablations are about."""
+"""The number of objects in Figures 6 (c) and 7, the stages and the ablations."""
 
 
 @dataclass(frozen=True)
 class StudyConfig:
     """What to compute. No ablations when `ablation_seeds` is 0.
 
-    `looks_seed`: which caregiver is looked at. `data`: folder of a recorded data set, in place of
-    a rendered caregiver; then there is no Figure 7, because the world around her is not known.
+    `looks_seed`: seed of the caregiver. `data`: folder of a recorded data set, in place of a
+    rendered caregiver; then there is no Figure 7, because the world around her is not known.
     `pool`: looks of the data to learn from; 0: as many as the paper, or four fifths of them.
-    `episodes`: trials watched for Figure 7.
+    `episodes`: number of trials for Figure 7.
     """
 
     plan: Plan = field(default_factory=Plan)
@@ -49,7 +49,7 @@ class StudyConfig:
 
 @dataclass(frozen=True)
 class Study:
-    """What has been computed; conditions by reading, then by object count or by variant."""
+    """The results; conditions by reading, then by object count or by variant."""
 
     config: StudyConfig
     materials: Materials
@@ -59,19 +59,21 @@ class Study:
     seconds: dict[str, float]
 
     def featured(self) -> dict[str, Condition]:
-        """The condition of each reading that is looked into."""
+        """Return the condition with `FEATURED_OBJECTS` of each reading."""
         return {name: found[FEATURED_OBJECTS] for name, found in self.by_objects.items()}
 
 
-def run_study(config: StudyConfig, progress: Progress) -> Study:
-    """Compute everything; the time of each part goes into `seconds`."""
+def run_study(
+    config: StudyConfig, progress: ProgressBars, materials: Materials | None = None
+) -> Study:
+    """Compute everything, and measure the time of each part in `seconds`.
+
+    `materials`: the looks to use; None: those that the configuration names.
+    """
     torch.set_num_threads(1)
     seconds: dict[str, float] = {}
     with _timed(seconds, 'looks at the caregiver'):
-        if config.data:
-            materials = recorded_materials(Path(config.data), config.pool, config.scene)
-        else:
-            materials = prepare_materials(config.scene, config.looks_seed, progress)
+        materials = materials or _materials_of(config, progress)
     with _timed(seconds, 'compilation'):
         compile_kernel(materials)
     by_objects, episodes, ablations = {}, {}, {}
@@ -88,6 +90,12 @@ def run_study(config: StudyConfig, progress: Progress) -> Study:
     return Study(config, materials, by_objects, episodes, ablations, seconds)
 
 
+def _materials_of(config: StudyConfig, progress: ProgressBars) -> Materials:
+    if config.data:
+        return recorded_materials(Path(config.data), config.pool, config.scene)
+    return prepare_materials(config.scene, config.looks_seed, progress)
+
+
 @contextmanager
 def _timed(seconds: dict[str, float], part: str) -> Iterator[None]:
     start = time.perf_counter()
@@ -96,30 +104,30 @@ def _timed(seconds: dict[str, float], part: str) -> Iterator[None]:
 
 
 def compile_kernel(materials: Materials) -> None:
-    """Compile (or load) the kernel, so that no measured time contains it."""
+    """Compile the kernel, or load it from the cache, before times are measured."""
     run_conditions({'': reading('all')}, Plan(trials=30, seeds=(0,), test_trials=1), materials)
 
 
 def read_ablations(path: Path | None = None) -> dict[str, dict[str, Any]]:
-    """Settings by the name of the variant, from a YAML file or from the one of the package."""
+    """Return settings by the name of the variant, from a YAML file or from the package's own."""
     shipped = resources.files('ja_experiments.paper') / 'ablations.yaml'
     text = path.read_text('utf-8') if path else shipped.read_text('utf-8')
     return yaml.safe_load(text)
 
 
-def prepare_materials(scene: str, looks_seed: int, progress: Progress) -> Materials:
-    """The looks at the caregiver of a scene, rendered if they are not kept, and its places."""
+def prepare_materials(scene: str, looks_seed: int, progress: ProgressBars) -> Materials:
+    """Return the looks of a scene, rendered if they are not cached, and its object ranges."""
     with progress.bar('looks at the caregiver', POOL + FRESH) as advance:
-        looks = load_looks(scene, looks_seed, say=progress.say, progress=advance)
+        looks = load_looks(scene, looks_seed, report=progress.print_line, progress=advance)
     origin = (
         f'looks at a rendered caregiver (scene `{scene}`, seed {looks_seed}), through the face '
         'detector and the crop of the live graph'
     )
-    return Materials.of(looks, load_scene(scene).objects, origin)
+    return Materials.from_looks(looks, load_scene(scene).objects, origin)
 
 
 def _figure_6(
-    name: str, config: StudyConfig, materials: Materials, progress: Progress
+    name: str, config: StudyConfig, materials: Materials, progress: ProgressBars
 ) -> dict[int, Condition]:
     configs = {str(n): reading(name).with_settings({'objects': n}) for n in OBJECTS}
     with progress.bar(f'figure 6, pairs: {name}', _trials(configs, config.plan)) as advance:
@@ -128,10 +136,10 @@ def _figure_6(
 
 
 def _figure_7(
-    name: str, condition: Condition, config: StudyConfig, progress: Progress
+    name: str, condition: Condition, config: StudyConfig, progress: ProgressBars
 ) -> list[Episode]:
     with progress.bar(f'figure 7, pairs: {name}', config.episodes) as advance:
-        return watch(
+        return record_episodes(
             condition.config,
             condition.runs[0].network,
             config.scene,
@@ -142,7 +150,7 @@ def _figure_7(
 
 
 def _ablations(
-    name: str, config: StudyConfig, materials: Materials, progress: Progress
+    name: str, config: StudyConfig, materials: Materials, progress: ProgressBars
 ) -> dict[str, Condition]:
     base = reading(name).with_settings({'objects': FEATURED_OBJECTS})
     configs = {label: base.with_settings(changed) for label, changed in read_ablations().items()}

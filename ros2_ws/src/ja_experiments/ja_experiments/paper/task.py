@@ -19,7 +19,7 @@ from ja_perception.core.salient_objects import InterestConfig
 from ja_sim.core.specs import ObjectsSpec
 
 ATTENDED = 0
-"""Index of the object that the caregiver means."""
+"""Index of the object that the caregiver attends to."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Setting:
 
 
 class SimulatedTask:
-    """Draws settings, and says what a camera would detect in them."""
+    """Draws settings, and computes what a camera would detect in them."""
 
     def __init__(
         self, config: TaskConfig, interest: InterestConfig, places: ObjectsSpec, looks: Looks
@@ -45,13 +45,13 @@ class SimulatedTask:
         self._alpha = np.array([interest.alpha_col, interest.alpha_edg, interest.alpha_mot])
         self._half_view = np.tan([config.view_pan_rad, config.view_tilt_rad])
 
-    def draw(self, rng: np.random.Generator) -> Setting:
-        """The next trial's environment."""
+    def draw_setting(self, rng: np.random.Generator) -> Setting:
+        """Draw the environment of the next trial."""
         look = int(rng.random() * len(self._looks))
-        told = rng.random() < self._config.reliability
+        reliable = rng.random() < self._config.reliability
         directions = np.empty((self._config.objects, 2))
         for index in range(self._config.objects):
-            if index == ATTENDED and told:
+            if index == ATTENDED and reliable:
                 directions[index] = self._looks.directions[look]
             else:
                 directions[index] = self._free_place(rng, look, directions[:index])
@@ -62,13 +62,13 @@ class SimulatedTask:
         return Setting(look, directions, features)
 
     def in_view(self, posture: NDArray[np.float64], direction: NDArray[np.float64]) -> bool:
-        """Is a direction within the picture taken from a posture?"""
+        """Return whether a direction is within the picture taken from a posture."""
         return bool(np.all(np.abs(rays_of_directions(posture, direction)) < self._half_view))
 
     def detections(self, setting: Setting, posture: NDArray[np.float64]) -> list[Detection]:
-        """What a perfect detector sees from a posture: the face, if in view, then the objects.
+        """Return what a perfect detector sees from a posture: the face, if in view, then objects.
 
-        As in Eq. 1, what has no feature of interest is not extracted.
+        As in Eq. 1, an object without a feature of interest is not detected.
         """
         face = self._looks.faces_at[setting.look]
         found = []
@@ -86,7 +86,7 @@ class SimulatedTask:
     def _free_place(
         self, rng: np.random.Generator, look: int, taken: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Any direction [rad] that is clear of the face and of the objects already placed."""
+        """Draw a direction [rad] that keeps its gap to the face and to the objects in `taken`."""
         places = self._places
         pan, tilt = np.radians(places.pan_deg), np.radians(places.tilt_deg)
         face = vectors_of_directions(self._looks.faces_at[look])

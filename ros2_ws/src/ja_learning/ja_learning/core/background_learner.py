@@ -1,4 +1,4 @@
-"""Learning beside inference: one thread learns, a snapshot of the weights answers meanwhile."""
+"""Learning beside inference: one thread learns, and a snapshot answers questions meanwhile."""
 
 from collections import deque
 from collections.abc import Callable
@@ -12,26 +12,29 @@ Answer = TypeVar('Answer')
 
 
 class BackgroundLearner:
-    """Owns a learner, which nobody else may touch but through `ask`.
+    """Owns a learner, which no one else may touch but through `call_with_learner`.
 
-    A lesson shows in what `predictor` answers all at once, when it is over. When that is depends
-    on what else the machine has to do. Who needs the same answers in every run sets `behind`: the
-    newest so many lessons never show yet, and all those before them are waited for.
+    An update shows in the answers of `predictor` all at once, when it is over. When that is
+    depends on what else the machine has to do. For the same answers in every run, set `behind`:
+    the newest so many updates do not show yet, and all those before them are waited for.
     """
 
     def __init__(
         self,
         learner: Learner,
-        learned: Callable[[Learner], None],
+        after_update: Callable[[Learner], None],
         behind: int | None = None,
-        begins: Callable[[], None] = lambda: None,
+        on_start: Callable[[], None] = lambda: None,
     ) -> None:
-        """In the thread that learns `begins` is called first, `learned` after every lesson."""
+        """Start the thread that learns.
+
+        It calls `on_start` first, and `after_update` after every update.
+        """
         self._learner = learner
-        self._learned = learned
+        self._after_update = after_update
         self._behind = behind
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix='learner', initializer=begins)
-        self._lessons: deque[Future[Predictor]] = deque()
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix='learner', initializer=on_start)
+        self._pending_updates: deque[Future[Predictor]] = deque()
         self._predictor: Predictor = learner.snapshot()
         self._errors: deque[Exception] = deque()
         self.trials = learner.trials
@@ -39,49 +42,49 @@ class BackgroundLearner:
 
     @property
     def predictor(self) -> Predictor:
-        """What is believed now."""
-        while self._lessons and self._may_show():
-            self._predictor = self._lessons.popleft().result()
+        """Return what is believed now."""
+        while self._pending_updates and self._may_show():
+            self._predictor = self._pending_updates.popleft().result()
         return self._predictor
 
     @property
     def waiting(self) -> int:
-        """How many lessons are still to be learned, the one under way included."""
-        return sum(not lesson.done() for lesson in self._lessons)
+        """Return how many updates are not over, the one under way included."""
+        return sum(not update.done() for update in self._pending_updates)
 
-    def learn(self, trial: Trial) -> None:
-        """Hand over a finished trial; returns at once."""
+    def update(self, trial: Trial) -> None:
+        """Hand over a finished trial; return at once."""
         self.trials += 1
-        self._lessons.append(self._thread.submit(self._learn, trial))
+        self._pending_updates.append(self._thread.submit(self._update, trial))
 
     def pop_errors(self) -> list[Exception]:
-        """What went wrong in lessons since the last call, in `learned` too."""
+        """Return the errors of updates, and of `after_update`, since the last call."""
         return [self._errors.popleft() for _ in range(len(self._errors))]
 
-    def ask(self, question: Callable[[Learner], Answer]) -> Answer:
-        """The answer of the learner itself when all is learned; waits for it.
+    def call_with_learner(self, function: Callable[[Learner], Answer]) -> Answer:
+        """Wait for all pending updates, call a function with the learner, and return its answer.
 
-        What the question raises is raised here.
+        Raises what the function raises.
         """
-        return self._thread.submit(question, self._learner).result()
+        return self._thread.submit(function, self._learner).result()
 
     def close(self, patience_s: float) -> Learner:
-        """Learn what was handed over, if it takes no longer [s], and give the learner back."""
+        """Learn the pending trials for at most so long [s], and give the learner back."""
         try:
-            wait(self._lessons, timeout=patience_s)
+            wait(self._pending_updates, timeout=patience_s)
         finally:  # a second Ctrl-C: without this the thread would still learn all that waits
             self._thread.shutdown(cancel_futures=True)
         return self._learner
 
     def _may_show(self) -> bool:
         if self._behind is None:
-            return self._lessons[0].done()
-        return len(self._lessons) > self._behind
+            return self._pending_updates[0].done()
+        return len(self._pending_updates) > self._behind
 
-    def _learn(self, trial: Trial) -> Predictor:
+    def _update(self, trial: Trial) -> Predictor:
         try:
-            self._learner.learn(trial)
-            self._learned(self._learner)
-        except Exception as error:  # it belongs to who asks for pop_errors
+            self._learner.update(trial)
+            self._after_update(self._learner)
+        except Exception as error:  # kept for the caller of pop_errors
             self._errors.append(error)
         return self._learner.snapshot()

@@ -51,7 +51,7 @@ def save_checkpoint(
 
 
 def load_checkpoint(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Arrays and description of a checkpoint; loading runs no code from the file (no pickle).
+    """Return arrays and description of a checkpoint; no code from the file is run (no pickle).
 
     Raises FileNotFoundError, or ValueError when the file is damaged or not a checkpoint.
     """

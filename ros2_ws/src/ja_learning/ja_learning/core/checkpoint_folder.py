@@ -1,4 +1,4 @@
-"""The checkpoints of a learner: numbered, the older ones kept, the newest good one taken up."""
+"""The checkpoints of a learner: numbered files, of which a start takes the newest good one."""
 
 import fcntl
 import os
@@ -22,7 +22,7 @@ class CheckpointConfig(Configuration):
     """Where and when a learner is saved."""
 
     checkpoint_folder: str = parameter(
-        '', 'where what was learned outlives the process; empty: nowhere'
+        '', 'folder for checkpoints of what was learned; empty: none are written'
     )
     checkpoint_every_trials: int = parameter(
         10, 'save after so many learned trials; 0: only when asked, and at the end', low=0
@@ -34,14 +34,14 @@ class CheckpointConfig(Configuration):
 
 
 class Resumed(NamedTuple):
-    """The checkpoint that a learner continues from (None: there was none), and why not others."""
+    """The checkpoint that a learner continues from, or None, and why others were refused."""
 
     path: Path | None
     refused: list[str]
 
 
 class CheckpointFolder:
-    """Files `<kind>-<number>.npz`; numbers rise whatever the learner, also when it starts anew.
+    """Files `<kind>-<number>.npz`; numbers rise for any learner, also after a reset.
 
     One process at a time has the folder: two learners would take each other's for their own.
     """
@@ -71,7 +71,7 @@ class CheckpointFolder:
         self._lock.close()
 
     def save(self, learner: Learner) -> Path:
-        """Write all that was learned; the path. Raises as `save_checkpoint`."""
+        """Write all that was learned, and return the path. Raises as `save_checkpoint`."""
         number = max(map(_number, self._newest_first()), default=0) + 1
         path = self.folder / f'{learner.kind}-{number:06d}.npz'
         save_checkpoint(path, learner.state(), _description(learner))
@@ -96,7 +96,7 @@ class CheckpointFolder:
         """Restore the newest checkpoint that is whole and of this learner's configuration.
 
         Raises ConfigError, and changes nothing, when there are checkpoints and none can be used:
-        an untrained learner must not stand unnoticed in the place of a taught one.
+        an untrained learner must not replace a trained one unnoticed.
         """
         refused = []
         for path in self._newest_first():
@@ -110,7 +110,7 @@ class CheckpointFolder:
         if refused:
             raise ConfigError(
                 f'none of the {len(refused)} checkpoints in {self.folder} can be used; the newest:'
-                f' {refused[0]}: mend that, or name another folder'
+                f' {refused[0]}: fix that, or name another folder'
             )
         return Resumed(None, refused)
 
@@ -128,7 +128,7 @@ class CheckpointFolder:
 
 
 def restore_checkpoint(path: Path, learner: Learner) -> None:
-    """Let a learner continue from a checkpoint.
+    """Restore a learner from a checkpoint.
 
     Raises FileNotFoundError, or ValueError with one sentence when the file is damaged, or of
     another learner or configuration; the learner is then as before.

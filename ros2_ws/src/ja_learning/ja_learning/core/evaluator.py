@@ -1,6 +1,6 @@
 """The internal evaluator (Nagai et al. 2003, section 2.2.3): has visual attention succeeded?
 
-It knows whether *an* object stands in the centre, never whether it is the one that was meant.
+It knows whether *an* object stands in the centre, never whether it is the attended object.
 """
 
 from dataclasses import dataclass
@@ -51,10 +51,10 @@ class InternalEvaluator:
     def fixation(
         self, detections: list[Detection], posture: Posture
     ) -> NDArray[np.float64] | None:
-        """Direction (pan, tilt), shape (2,) [rad], of the fixated object, or None.
+        """Return the direction (pan, tilt), shape (2,) [rad], of the fixated object, or None.
 
         None until the head has stood still for long enough, and while a face stands nearer to the
-        centre than the object: then the head watches somebody, not something.
+        centre than the object: then the head watches a person, not an object.
         """
         if not self._holds_still(posture):
             return None

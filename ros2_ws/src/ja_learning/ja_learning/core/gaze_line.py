@@ -1,20 +1,20 @@
-"""A fast learner: where along the line of her gaze is what she means, of all that was seen?
+"""A fast learner: which of all objects that were seen stands on the line of her gaze?
 
 The paper learns from the one object that was fixated, right or wrong. This learner takes *all*
-objects seen in the trial as candidates; which one was meant is latent, and never told
-(cross-situational learning). It learns by gradient steps up the likelihood that *one* of the
-candidates was meant, or, with a small probability, none of them. How likely a candidate is, is
-asked in proportion to the places that were seen in other trials (noise-contrastive, as InfoNCE by
-van den Oord et al. 2018): nothing is to be learned from where things are seen, whatever she looks
-at. Trials are kept and replayed.
+objects seen in the trial as candidates. Which one is the attended object is latent, and no label
+gives it (cross-situational learning). Gradient steps go up the likelihood that *one* of the
+candidates is the attended object, or, with a small probability, none of them. The likelihood of a
+candidate is relative to places that were seen in other trials, the negatives (noise-contrastive,
+as InfoNCE by van den Oord et al. 2018): so nothing is learned from where objects are seen in any
+case. Trials are kept and replayed.
 
-Early in life the likelihood is tempered (deterministic annealing), or the first guesses would
-confirm themselves. How fast one may cool, nobody can know: so several members learn side by side,
-from slow to hasty, and are weighed by the evidence that each has for itself (`evidence`). One that
-fell for its own guesses - the mirrored gaze is the classical error - has evidence against it, and
-is overwritten by the best. If the evidence turns against all of them, the world has changed (a
-new caregiver, a camera the other way round): what came before is forgotten, and learning begins
-anew, for half of the members from nothing.
+At first the likelihood is tempered (deterministic annealing), or the first guesses would confirm
+themselves. The best annealing rate is unknown. So several members learn side by side, from slow to
+fast annealing, and are weighed by the evidence that each has for itself (`evidence`). One that
+confirmed its own guesses - the mirrored gaze is the classical error - has evidence against it, and
+is overwritten by the best member. If the evidence turns against all of them, the world has changed
+(a new caregiver, a camera the other way round). Then the trials before the change are forgotten,
+and half of the members are re-initialised.
 """
 
 import copy
@@ -37,35 +37,36 @@ from ja_learning.core.gaze_line_network import (
 from ja_learning.core.replay_memory import ReplayMemory
 from ja_learning.core.trial import FACE_SHAPE, Trial
 
-# The likelihood is at full strength after so many trials for every pair of candidates: the more
-# there are, the later one may be told from another.
-_HASTIEST, _SLOWEST = 0.25, 2.0
+# Annealing ends after so many trials for every pair of candidates: the more candidates there are,
+# the more trials it takes to tell one from another. A small number is a fast annealing rate.
+_FASTEST_ANNEALING, _SLOWEST_ANNEALING = 0.25, 2.0
 _INITIAL_INVERSE_TEMPERATURE = 0.1
-# With how many places, seen in other trials, those of a trial are compared: to learn, anew in each
-# step; to weigh it, once, where what is due to their choice would be taken for evidence.
+# With how many negatives the places of a trial are compared: in each training step, drawn again;
+# to weigh a trial, once, where the effect of the draw would be taken for evidence.
 _TRAINING_NEGATIVES, _WEIGHING_NEGATIVES = 64, 256
-# How differently a face is replayed: its size (a share), its place, its pixels (in deviations).
-_VARIED_SIZE, _VARIED_PLACE_PIXELS, _VARIED_LIGHT = 0.1, 1.0, 0.3
+# Augmentation of a replayed face: its size (a share), its place, its pixels (in deviations).
+_AUGMENTED_SIZE, _AUGMENTED_PLACE_PIXELS, _AUGMENTED_LIGHT = 0.1, 1.0, 0.3
 _COMPARED_EVERY_TRIALS = 10
-_BEATEN_BY_NATS = 15.0
+_REPLACED_BEHIND_NATS = 15.0
 _CLEAR_NATS = 10.0
 _WRONG_NATS = 8.0
 
 
 class GazeLineLearner:
-    """Learns from all that was seen in a trial; proposes what she most probably means."""
+    """Learns from all that was seen in a trial; proposes the most probable gaze target."""
 
     kind = 'gaze_line'
 
     def __init__(self, config: GazeLineConfig, seed: int) -> None:
+        """Draw the initial weights from this seed, and compile what answers."""
         self.config = config
-        self._network = _untaught(config, seed)
+        self._network = _initial_network(config, seed)
         self._random = torch.Generator().manual_seed(seed)
         # Proposals come from the running mean of the weights, which is steadier than the last.
         self._mean = copy.deepcopy(self._network).requires_grad_(False)
         self._optimiser = _optimiser(self._network, config)
         self._annealing = _annealing(config.members)
-        # How much was remembered when each member began to learn.
+        # How many trials were remembered when each member started.
         self._began = np.zeros(config.members, int)
         self._memory = ReplayMemory(config.replay_memory)
         # Of each member, and of their mixture.
@@ -75,16 +76,16 @@ class GazeLineLearner:
         self._belief: GazeLineBelief | None = None
         self.trials = 0
         self.last_error_rad = float('nan')
-        # Whoever asks first would wait for the compiler.
+        # Otherwise the first proposal would wait for the compiler.
         self.propose(np.zeros(FACE_SHAPE, np.uint8), np.zeros(2), np.zeros(2), np.empty((0, 2)))
 
     @property
     def log_evidence(self) -> float:
-        """Evidence [nats] that the face tells this learner something, as in `Predictor`."""
+        """Return the evidence [nats] that the face informs this learner, as in `Predictor`."""
         return float(self._evidence.nats[-1])
 
     def snapshot(self) -> GazeLineBelief:
-        """What is believed now, made when first asked for; what is learned later leaves it."""
+        """Return what is believed now, made when first asked for; no later update changes it."""
         if self._belief is None:
             self._belief = GazeLineBelief(
                 self._mean,
@@ -98,23 +99,17 @@ class GazeLineLearner:
     def propose(
         self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike
     ) -> NDArray[np.float64]:
-        """Change of posture (2,) [rad] towards what she most probably means; as in `Predictor`."""
+        """Return a change of posture (2,) [rad] towards the most probable gaze target."""
         return self.snapshot().propose(face, face_at, posture, candidates)
 
     def belief(
         self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
     ) -> NDArray[np.float64]:
-        """Directions (count, 2) [rad] drawn from the belief about what she means."""
+        """Draw directions (count, 2) [rad] from the belief about the gaze target."""
         return self.snapshot().belief(face, face_at, rng, count)
 
-    def log_density(
-        self, faces: ArrayLike, face_at: ArrayLike, directions: ArrayLike
-    ) -> NDArray[np.float64]:
-        """log p [of 1 / rad^2] of directions (m, 2) given each of faces (n, 30, 25): (n, m)."""
-        return self.snapshot().log_density(faces, face_at, directions)
-
-    def learn(self, trial: Trial) -> None:
-        """Weigh a trial by what is believed, remember it, and replay some of those lived."""
+    def update(self, trial: Trial) -> None:
+        """Weigh a trial by what is believed, remember it, and replay some of those remembered."""
         self.trials += 1
         if not len(trial.candidates):
             return
@@ -123,29 +118,29 @@ class GazeLineLearner:
         changed = False
         if trial.seen_before_shift:
             changed = self._weigh(trial.face, places[: trial.seen_before_shift])
-        self._memory.add(trial.face, places)
+        self._memory.remember_trial(trial.face, places)
         if changed:
-            self._begin_anew(self._alarm.doubtful_trials)
+            self._reinitialise(self._alarm.doubtful_trials)
         inverse_temperature = self._inverse_temperature()
         for _ in range(self.config.replay_steps):
             self._step(inverse_temperature)
         if self.trials % _COMPARED_EVERY_TRIALS == 0:
-            self._replace_the_beaten()
+            self._replace_worst_member()
 
     def _log_weights(self) -> NDArray[np.float64]:
         nats = self._evidence.nats[:-1]
         return nats - np.logaddexp.reduce(nats)
 
     def _weigh(self, face: NDArray[np.uint8], places: NDArray[np.float32]) -> bool:
-        """Weigh what was seen; whether it is clear by now that the world has changed."""
+        """Weigh what was seen; return whether it is clear by now that the world has changed."""
 
         def log_probability(faces: NDArray[np.uint8]) -> NDArray[np.float64]:
             with torch.no_grad():
                 gaze = self._mean.gaze(standardised(faces[:, None]))
                 seen = torch.from_numpy(places)[None, None]
-                elsewhere = self._elsewhere(_WEIGHING_NEGATIVES)
-                ratio = self._mean.log_ratio(gaze, seen, elsewhere)
-            # That one of them was meant; which, is not known.
+                negatives = self._draw_negatives(_WEIGHING_NEGATIVES)
+                ratio = self._mean.log_ratio(gaze, seen, negatives)
+            # That one of them is the attended object; which one is not known.
             of_members = torch.logsumexp(ratio, dim=-1).numpy().astype(float)
             mixed = np.logaddexp.reduce(of_members + self._log_weights()[:, None], axis=0)
             return np.concatenate([of_members, mixed[None]])
@@ -160,9 +155,9 @@ class GazeLineLearner:
         # Each member replays its own choice, so that they differ; the newest trial always.
         ages = torch.randint(known, (count, members), generator=self._random).numpy()
         ages[0] = 0
-        faces, places = self._memory.at(ages)
+        faces, places = self._memory.trials_at(ages)
         loss = self._loss(
-            self._varied(standardised(faces)),
+            self._augmented(standardised(faces)),
             torch.from_numpy(places).transpose(0, 1),
             inverse_temperature,
         )
@@ -177,33 +172,33 @@ class GazeLineLearner:
             torch._foreach_lerp_(list(self._mean.parameters()), now, 1 - keep)
 
     def _hold_origins(self, inverse_temperature: torch.Tensor) -> None:
-        """Where a line begins would follow wrong guesses, while all candidates count alike."""
+        """Hold the origins of lines during annealing: they would follow wrong guesses."""
         slope = self._network.origin_tilt.grad
         if slope is not None:
             slope[inverse_temperature < 1.0] = 0.0
 
-    def _varied(self, faces: torch.Tensor) -> torch.Tensor:
-        """Each of faces (n, members, 30, 25) a little otherwise, as another look would show it.
+    def _augmented(self, faces: torch.Tensor) -> torch.Tensor:
+        """Vary each of faces (n, members, 30, 25) a little, as another look would show it.
 
-        Without it every member learns the remembered faces by heart, and the evidence says so.
+        Without it every member overfits the remembered faces, and the evidence falls.
         """
         pictures = faces.reshape(-1, 1, *faces.shape[-2:])
         scale, *shift = 2 * torch.rand((3, len(pictures)), generator=self._random) - 1
         maps = torch.zeros(len(pictures), 2, 3)
-        maps[:, 0, 0] = maps[:, 1, 1] = 1 + _VARIED_SIZE * scale
+        maps[:, 0, 0] = maps[:, 1, 1] = 1 + _AUGMENTED_SIZE * scale
         # In units of half a picture, x before y.
         for axis, pixels in enumerate((faces.shape[-1], faces.shape[-2])):
-            maps[:, axis, 2] = 2 / pixels * _VARIED_PLACE_PIXELS * shift[axis]
+            maps[:, axis, 2] = 2 / pixels * _AUGMENTED_PLACE_PIXELS * shift[axis]
         grid = nn.functional.affine_grid(maps, list(pictures.shape), align_corners=False)
         moved = nn.functional.grid_sample(
             pictures, grid, padding_mode='border', align_corners=False
         )
-        return moved.reshape(faces.shape) + _VARIED_LIGHT * torch.randn(
+        return moved.reshape(faces.shape) + _AUGMENTED_LIGHT * torch.randn(
             faces.shape, generator=self._random
         )
 
-    def _elsewhere(self, count: int) -> torch.Tensor:
-        """Places (members, count, 2) that were seen in any of the trials remembered."""
+    def _draw_negatives(self, count: int) -> torch.Tensor:
+        """Draw places (members, count, 2) that were seen in any of the trials remembered."""
         drawn = (count, self.config.members)
         ages = torch.randint(len(self._memory), drawn, generator=self._random)
         which = torch.rand(drawn, generator=self._random)
@@ -213,45 +208,45 @@ class GazeLineLearner:
     def _loss(
         self, faces: torch.Tensor, places: torch.Tensor, inverse_temperature: torch.Tensor
     ) -> torch.Tensor:
-        """Minus the tempered log likelihood that one of the candidates, or none, was meant."""
+        """Return minus the tempered log likelihood of one attended object, or none."""
         counts = (~torch.isnan(places[..., 0])).sum(-1, keepdim=True)
         inverse_temperature = inverse_temperature[:, None, None]
-        elsewhere = self._elsewhere(_TRAINING_NEGATIVES)
-        ratio = self._network.log_ratio(self._network.gaze(faces), places, elsewhere)
+        negatives = self._draw_negatives(_TRAINING_NEGATIVES)
+        ratio = self._network.log_ratio(self._network.gaze(faces), places, negatives)
         none = self.config.none_was_meant
         one = inverse_temperature * ratio + np.log1p(-none) - torch.log(counts)
-        # If none was meant, places are what they are elsewhere: a ratio of 1.
+        # Without an attended object, places are distributed as the negatives: a ratio of 1.
         nothing = (inverse_temperature * np.log(none)).expand(-1, len(faces), -1)
         tempered = torch.cat([one, nothing], dim=-1)
         # A sum over members, as none of them depends on another.
         return -(torch.logsumexp(tempered, dim=-1) / inverse_temperature[..., 0]).mean(dim=1).sum()
 
     def _inverse_temperature(self) -> torch.Tensor:
-        """Of each member, from 0.1, where all candidates count nearly alike, to 1."""
+        """Return that of each member, from 0.1, where all candidates count nearly alike, to 1."""
         typical = float(np.mean(self._memory.counts(50)))
-        lived = np.maximum(len(self._memory) - self._began, 0)
-        cooled = lived / (self._annealing * max(typical, 1.0) ** 2)
+        trials = np.maximum(len(self._memory) - self._began, 0)
+        annealed = trials / (self._annealing * max(typical, 1.0) ** 2)
         inverse_temperature = np.minimum(
-            1.0, _INITIAL_INVERSE_TEMPERATURE + (1 - _INITIAL_INVERSE_TEMPERATURE) * cooled
+            1.0, _INITIAL_INVERSE_TEMPERATURE + (1 - _INITIAL_INVERSE_TEMPERATURE) * annealed
         )
         return torch.from_numpy(inverse_temperature.astype(np.float32))
 
-    def _begin_anew(self, newest: int) -> None:
-        """Keep only so many newest trials; every second member forgets all that it knows."""
+    def _reinitialise(self, newest: int) -> None:
+        """Keep only so many newest trials, and re-initialise every second member."""
         self._memory.keep_newest(newest)
         self._alarm.reset()
         self._evidence.nats[:] = 0.0
         members = self.config.members
-        self._forget_weights(list(range(0, members, 2)))
+        self._reinitialise_members(list(range(0, members, 2)))
         self._annealing = _annealing(members)
         self._began[:] = 0
         self._optimiser.state.clear()
         self._steps = 0
 
-    def _forget_weights(self, members: list[int]) -> None:
-        """These members begin from nothing."""
+    def _reinitialise_members(self, members: list[int]) -> None:
+        """Give these members initial weights."""
         seed = int(torch.randint(2**62, (), generator=self._random))
-        fresh = _untaught(self.config, seed)
+        fresh = _initial_network(self.config, seed)
         with torch.no_grad():
             for network in (self._network, self._mean):
                 for old, new in zip(network.parameters(), fresh.parameters(), strict=True):
@@ -261,23 +256,23 @@ class GazeLineLearner:
                 for moments in (kept['exp_avg'], kept['exp_avg_sq']):
                     moments.reshape(self.config.members, -1)[members] = 0.0
 
-    def _replace_the_beaten(self) -> None:
+    def _replace_worst_member(self) -> None:
         """Overwrite the worst member by the best, if the evidence between them is clear.
 
-        Where all have evidence against them there is no best: the worst begins from nothing, now
-        that more is remembered, and slowly. If they knew before, the world may have changed: then
-        it is the alarm's turn.
+        Where all have evidence against them there is no best: the worst is re-initialised, now
+        that more is remembered, with the slowest annealing. If they knew something before, the
+        world may have changed, which the alarm decides.
         """
         nats = self._evidence.nats[:-1]
         best, worst = int(np.argmax(nats)), int(np.argmin(nats))
         if nats[best] < 0:
             if nats[worst] < -_WRONG_NATS and self._alarm.doubt == 0.0:
-                self._forget_weights([worst])
+                self._reinitialise_members([worst])
                 nats[worst] = 0.0
-                self._annealing[worst] = _SLOWEST
+                self._annealing[worst] = _SLOWEST_ANNEALING
                 self._began[worst] = len(self._memory)
             return
-        if nats[best] - nats[worst] < _BEATEN_BY_NATS:
+        if nats[best] - nats[worst] < _REPLACED_BEHIND_NATS:
             return
         with torch.no_grad():
             for network in (self._network, self._mean):
@@ -291,7 +286,7 @@ class GazeLineLearner:
         self._began[worst] = self._began[best]
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Everything that learning has changed, the remembered trials too, as named arrays."""
+        """Return all that learning has changed, the remembered trials too, as named arrays."""
         arrays = {f'network.{k}': v.numpy().copy() for k, v in self._network.state_dict().items()}
         arrays |= {f'mean.{k}': v.numpy().copy() for k, v in self._mean.state_dict().items()}
         for name, p in self._network.named_parameters():
@@ -305,7 +300,7 @@ class GazeLineLearner:
         return arrays | self._memory.state() | self._evidence.state()
 
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
-        """Take up the state of `state()`.
+        """Take the state of `state()`.
 
         Raises ValueError, and changes nothing, if it is another learner's or not finite.
         """
@@ -340,16 +335,16 @@ class GazeLineLearner:
         self._alarm.doubt, self._alarm.doubtful_trials = doubt, doubtful
 
 
-def _untaught(config: GazeLineConfig, seed: int) -> GazeLineNetwork:
-    # The seed's own generator: nobody else's random numbers change this learner.
+def _initial_network(config: GazeLineConfig, seed: int) -> GazeLineNetwork:
+    # A generator of its own: no other random numbers change this learner.
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         return GazeLineNetwork(config.members, config.channels)
 
 
 def _optimiser(network: GazeLineNetwork, config: GazeLineConfig) -> torch.optim.AdamW:
-    # What a trial says of a gaze is far less exact than its picture is, so that whoever may fit
-    # anything learns the noise. The numbers of the belief mean something: zero is not their home.
+    # A trial constrains the gaze far less than its picture would allow to fit: without decay the
+    # weights fit noise. The numbers of the belief have units: they must not decay to zero.
     decaying = network.weights()
     others = [p for p in network.parameters() if not any(p is weight for weight in decaying)]
     groups = [
@@ -360,7 +355,7 @@ def _optimiser(network: GazeLineNetwork, config: GazeLineConfig) -> torch.optim.
 
 
 def _annealing(members: int) -> NDArray[np.float64]:
-    return np.geomspace(_HASTIEST, _SLOWEST, members)
+    return np.geomspace(_FASTEST_ANNEALING, _SLOWEST_ANNEALING, members)
 
 
 def _loaded(

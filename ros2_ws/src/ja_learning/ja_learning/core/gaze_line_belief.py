@@ -1,4 +1,4 @@
-"""What the fast learner believes at one instant; asking it changes nothing."""
+"""What the fast learner believes at one instant; a question changes nothing."""
 
 from dataclasses import dataclass
 
@@ -36,7 +36,7 @@ class GazeLineBelief:
     def propose(
         self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike
     ) -> NDArray[np.float64]:
-        """Change of posture (2,) [rad] towards what she most probably means; as in `Predictor`."""
+        """Return a change of posture (2,) [rad] towards the most probable gaze target."""
         origin = np.asarray(face_at, float)
         coded = self._code(face)
         aim = coded.best_guess
@@ -50,7 +50,7 @@ class GazeLineBelief:
     def belief(
         self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
     ) -> NDArray[np.float64]:
-        """Directions (count, 2) [rad] drawn from the belief about what she means."""
+        """Draw directions (count, 2) [rad] from the belief about the gaze target."""
         coded, mixture = self._code(face), self._mixture
         shares = np.exp(mixture.log_shares[:, 0])
         weights = np.exp(self._log_weights)
@@ -72,13 +72,13 @@ class GazeLineBelief:
     def log_density(
         self, faces: ArrayLike, face_at: ArrayLike, directions: ArrayLike
     ) -> NDArray[np.float64]:
-        """log p [of 1 / rad^2] of directions (m, 2) given each of faces (n, 30, 25): (n, m)."""
+        """Return log p, (n, m) [of 1 / rad^2], of directions (m, 2) given faces (n, 30, 25)."""
         places = np.asarray(directions, float).reshape(-1, 2) - np.asarray(face_at, float)
         forms = self._forms(self._gaze(faces))
         return self._mixed(forms, places / ANGLE_SCALE_RAD) - 2 * np.log(ANGLE_SCALE_RAD)
 
     def _code(self, face: ArrayLike) -> '_Coded':
-        """One face is asked about on every image of a trial: coded once."""
+        """Code a face, once a trial: the same one comes with every image of it."""
         if self._coded is None or self._coded.face is not face:
             gaze = self._gaze(face)
             forms = self._forms(gaze)
@@ -91,18 +91,18 @@ class GazeLineBelief:
         return self._coded
 
     def _gaze(self, faces: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """u of n faces, pan and tilt, each (members, n, 1)."""
+        """Return u of n faces, pan and tilt, each (members, n, 1)."""
         gaze = self._pass(np.reshape(faces, (-1, *np.shape(faces)[-2:])))
         return gaze[..., :1], gaze[..., 1:]
 
     def _forms(self, gaze: tuple[NDArray[np.float64], NDArray[np.float64]]) -> NDArray[np.float64]:
-        """(members, n, 6, stretches)."""
+        """Return the forms of gazes, (members, n, 6, stretches)."""
         return np.stack(self._mixture.forms(*gaze, np.log), axis=2)
 
     def _mixed(
         self, forms: NDArray[np.float64], places: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """log p of places (m, 2), given the forms of n gazes: (n, m)."""
+        """Return log p of places (m, 2), given the forms of n gazes: (n, m)."""
         parts = np.stack(powers(*places.T), axis=-1) @ forms
         parts += self._log_weights[:, None, None, None]
         return np.logaddexp.reduce(parts, axis=(0, 3))
@@ -110,7 +110,7 @@ class GazeLineBelief:
 
 @dataclass(frozen=True)
 class _Coded:
-    """What one face says: its gazes, pan and tilt, and their forms.
+    """One face, coded: its gazes, pan and tilt, and their forms.
 
     `best_guess`: (2,) [rad] on the line of gaze of the surest member.
     """

@@ -19,7 +19,7 @@ class GazeLineConfig(Configuration):
     )
     channels: int = parameter(8, 'channels of the first convolution', low=1, high=256)
     none_was_meant: float = parameter(
-        0.05, 'prior probability that none of the candidates was meant', low=1e-4, high=0.9
+        0.05, 'prior probability that no candidate is the attended object', low=1e-4, high=0.9
     )
     top_down: bool = parameter(
         True,

@@ -1,9 +1,9 @@
-"""Where on the line of a gaze is what she means? A mixture over stretches of it, as arithmetic.
+"""Where on the line of a gaze is the gaze target? A mixture over stretches of it, as arithmetic.
 
     p(c | face) = sum_k w_k N(c; o + r_k u, r_k^2 (s_r^2 u u^T + s_u^2 I) + s_c^2 I),  u = u(face)
 
-With torch it is learned, with numpy it is asked: torch lets go of the interpreter in each of its
-operations, and whoever must answer soon would then wait for the thread that learns.
+Torch learns it, numpy evaluates it: torch releases the interpreter in each of its operations, and
+an answer that is due soon would then wait for the thread that learns.
 """
 
 import math
@@ -34,14 +34,14 @@ class LineMixture(Generic[Array]):
     of_place: Array
 
     def on_line(self, pan: Array, tilt: Array) -> tuple[Array, Array]:
-        """o + r_k u for gazes (members, n, 1): (members, n, stretches), pan and tilt."""
+        """Return o + r_k u for gazes (members, n, 1): (members, n, stretches), pan and tilt."""
         return self.stretches * pan, self.origin_tilt + self.stretches * tilt
 
     def forms(self, pan: Array, tilt: Array, log: Callable[[Array], Array]) -> list[Array]:
-        """Factors of `powers(c)` in log w_k N(c; ...): six arrays (members, n, stretches).
+        """Return factors of `powers(c)` in log w_k N(c; ...): six arrays (members, n, stretches).
 
         For gazes (members, n, 1); `log`: of the library that the arrays are of. To weigh many
-        places, the largest work of a lesson, is then one product of matrices.
+        places, the largest work of an update, is then one product of matrices.
         """
         squared = self.stretches**2
         across, further = squared * self.of_gaze + self.of_place, squared * self.of_stretch
@@ -59,5 +59,5 @@ class LineMixture(Generic[Array]):
 
 
 def powers(pan: Array, tilt: Array) -> list[Array]:
-    """What the quadratic forms of a place are made of."""
+    """Return the powers of a place that the quadratic forms multiply."""
     return [pan**0, pan, tilt, pan**2, pan * tilt, tilt**2]

@@ -1,7 +1,7 @@
-"""Beliefs about what she means, on the line of her gaze: several small networks in one.
+"""Beliefs about the gaze target, on the line of her gaze: several small networks in one.
 
-A face gives a gaze u, and what she means stands somewhere along it, since depth cannot be told
-from the direction of a gaze: o + r_k u away from her face, with probability w_k. A stretch r_k is
+A face gives a gaze u, and the gaze target stands somewhere along it, since the direction of a gaze
+does not show depth: o + r_k u away from her face, with probability w_k. A stretch r_k is
 known to s_r (a share of it), which lets it reach into the next; the gaze to s_u, a place to s_c
 (`gaze_line_mixture`). u is a convolutional network, odd in pan and even in tilt under a mirror (a
 face is symmetric, and so is the task). o is where the lines begin: at her eyes, which are above
@@ -33,6 +33,7 @@ class GazeLineNetwork(nn.Module):
     """
 
     def __init__(self, members: int, channels: int) -> None:
+        """Draw the initial weights from torch's generator."""
         super().__init__()
         self.members = members
         narrow, wide = members * channels, members * 2 * channels
@@ -57,12 +58,12 @@ class GazeLineNetwork(nn.Module):
         self.log_place_deviation = nn.Parameter(torch.full((members, 1), 0.05).log())
 
     def weights(self) -> list[nn.Parameter]:
-        """Those of the layers that code a face, without biases."""
+        """Return the weights of the layers that code a face, without biases."""
         layers = [part for part in self.coder if isinstance(part, nn.Conv2d)]
         return [*(layer.weight for layer in layers), self.hidden_weights, self.gaze_weights]
 
     def gaze(self, faces: torch.Tensor) -> torch.Tensor:
-        """u, shape (members, n, 2), of standardised faces (n, members or 1, 30, 25)."""
+        """Return u, (members, n, 2), of standardised faces (n, members or 1, 30, 25)."""
         faces = faces.expand(-1, self.members, -1, -1)
         # Grouped convolutions are faster with the channels last.
         pictures = torch.cat([faces, faces.flip(-1)]).to(memory_format=torch.channels_last)
@@ -73,7 +74,7 @@ class GazeLineNetwork(nn.Module):
         return torch.stack([pan, tilt], dim=-1) / 2
 
     def mixture(self) -> LineMixture[torch.Tensor]:
-        """What the belief is made of beside the gaze."""
+        """Return the numbers of the belief beside the gaze."""
         return LineMixture(
             stretches=STRETCHES,
             log_shares=torch.log_softmax(self.stretch_logits, dim=-1)[:, None],
@@ -84,35 +85,35 @@ class GazeLineNetwork(nn.Module):
         )
 
     def log_density(self, gaze: torch.Tensor, places: torch.Tensor) -> torch.Tensor:
-        """log p(c | face), (members, n, m), of places (members or 1, n or 1, m, 2), given u."""
+        """Return log p(c | face), (members, n, m), of places (members or 1, n or 1, m, 2)."""
         return torch.logsumexp(_powers(places) @ self._forms(gaze), dim=-1)
 
     def log_ratio(
-        self, gaze: torch.Tensor, places: torch.Tensor, elsewhere: torch.Tensor
+        self, gaze: torch.Tensor, places: torch.Tensor, negatives: torch.Tensor
     ) -> torch.Tensor:
-        """log p(c | face), (members, n, m), less log of its mean; -inf where c is NaN.
+        """Return log p(c | face), (members, n, m), less log of its mean; -inf where c is NaN.
 
-        `places`: (members or 1, n or 1, m, 2), seen in a trial; `elsewhere`: (members, k, 2), seen
+        `places`: (members or 1, n or 1, m, 2), seen in a trial; `negatives`: (members, k, 2), seen
         in others. The mean is over both, so that no ratio is beyond their number.
         """
         forms, missing = self._forms(gaze), torch.isnan(places[..., 0])
         here = torch.logsumexp(_powers(torch.nan_to_num(places)) @ forms, dim=-1)
         here = here.masked_fill(missing, -torch.inf)
         # One product for each member, not for each of its gazes.
-        there = _powers(elsewhere) @ forms.transpose(1, 2).flatten(2)
+        there = _powers(negatives) @ forms.transpose(1, 2).flatten(2)
         there = torch.logsumexp(there.unflatten(2, (-1, len(STRETCHES))), dim=(1, 3))
         total = torch.logaddexp(torch.logsumexp(here, dim=-1), there)
-        count = (~missing).sum(-1) + elsewhere.shape[1]
+        count = (~missing).sum(-1) + negatives.shape[1]
         return here - (total - torch.log(count))[..., None]
 
     def _forms(self, gaze: torch.Tensor) -> torch.Tensor:
-        """Of the parts of p(c | face), (members, n, 6, stretches)."""
+        """Return the forms of the parts of p(c | face), (members, n, 6, stretches)."""
         pan, tilt = gaze.split(1, dim=-1)
         return torch.stack(self.mixture().forms(pan, tilt, torch.log), dim=2)
 
 
 def standardised(faces: NDArray[np.uint8] | torch.Tensor) -> torch.Tensor:
-    """Faces uint8 (..., 30, 25), each with mean 0 and deviation 1."""
+    """Return faces uint8 (..., 30, 25) as floats, each with mean 0 and deviation 1."""
     return nn.functional.layer_norm(torch.as_tensor(faces).float(), FACE_SHAPE, eps=LEAST_VARIANCE)
 
 
@@ -123,7 +124,7 @@ def give_member(tensor: torch.Tensor, members: int, giver: int, taker: int) -> N
 
 
 def _uniform(inputs: int, shape: tuple[int, ...]) -> torch.Tensor:
-    """As torch begins a linear layer of so many inputs."""
+    """Draw weights as torch initialises a linear layer of so many inputs."""
     return (2 * torch.rand(shape) - 1) / math.sqrt(inputs)
 
 

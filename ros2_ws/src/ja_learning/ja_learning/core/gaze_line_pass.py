@@ -1,9 +1,8 @@
-"""What a face says of her gaze, in one compiled pass: `GazeLineNetwork.gaze` for who must answer.
+"""The gaze of a face in one compiled pass: `GazeLineNetwork.gaze`, where an answer is due soon.
 
-Torch learns. To answer with it takes forty operations, each of which costs more than all that it
-computes when another thread has had the caches since, and asks for the interpreter anew while
-that thread learns: four times as long as this pass (docs/learner.md). A test holds the two
-together.
+Torch learns. To answer with it takes forty operations. Each of them costs more than its arithmetic
+when another thread has used the caches meanwhile, and waits for the interpreter again while that
+thread learns: four times as long as this pass (docs/learner.md). A test holds the two together.
 """
 
 import numpy as np
@@ -19,9 +18,10 @@ _Layer = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 
 class GazeLinePass:
-    """The gazes of a network as it is now; what it learns later does not show."""
+    """The gazes of a network as it is now; later updates do not show."""
 
     def __init__(self, network: GazeLineNetwork) -> None:
+        """Copy the weights of the network."""
         members = network.members
         convolutions = [part for part in network.coder if isinstance(part, nn.Conv2d)]
         first, *others = (_convolution(layer, members) for layer in convolutions)
@@ -39,7 +39,7 @@ class GazeLinePass:
         )
 
     def __call__(self, faces: ArrayLike) -> NDArray[np.float64]:
-        """u, shape (members, n, 2), of faces uint8 (n, 30, 25)."""
+        """Return u, shape (members, n, 2), of faces uint8 (n, 30, 25)."""
         return _gazes(np.ascontiguousarray(faces, np.uint8), *self._layers)
 
 
@@ -52,7 +52,7 @@ def _convolution(layer: nn.Conv2d, members: int) -> _Layer:
 
 
 def _array(parameter: nn.Parameter | None) -> NDArray[np.float32]:
-    """A copy: the parameter goes on learning."""
+    """Copy a parameter, which goes on learning."""
     assert parameter is not None
     return parameter.detach().numpy().copy()
 
@@ -72,15 +72,15 @@ def _gazes(faces, first, second, third, hidden, gaze):  # type: ignore[no-untype
                 middle = _convolved(of_member, second[0][m], second[1][m], 3, 1)
                 late = _convolved(middle, third[0][m], third[1][m], 3, 0)
                 units = np.dot(late.reshape(-1), hidden[0][m]) + hidden[1][m]
-                said = np.dot(np.maximum(units, np.float32(0)), gaze[0][m]) + gaze[1][m]
-                found[m, n, 0] += -said[0] / 2 if mirrored else said[0] / 2
-                found[m, n, 1] += said[1] / 2
+                answer = np.dot(np.maximum(units, np.float32(0)), gaze[0][m]) + gaze[1][m]
+                found[m, n, 0] += -answer[0] / 2 if mirrored else answer[0] / 2
+                found[m, n, 1] += answer[1] / 2
     return found
 
 
 @njit(nogil=True)
 def _standardised(face):  # type: ignore[no-untyped-def]
-    """With mean 0 and deviation 1, and two rows and columns of 0 around, (34, 29, 1)."""
+    """Scale to mean 0 and deviation 1, with two rows and columns of 0 around, (34, 29, 1)."""
     rows, columns = face.shape
     mean = face.mean()
     scale = 1 / np.sqrt(face.var() + LEAST_VARIANCE)
@@ -93,7 +93,7 @@ def _standardised(face):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _convolved(picture, weights, biases, size, margin):  # type: ignore[no-untyped-def]
-    """A picture (rows, columns, channels) at every second place, rectified, in a margin of 0."""
+    """Convolve a picture (rows, columns, channels) with stride 2, rectify it, add margins of 0."""
     rows, columns = (picture.shape[0] - size) // 2 + 1, (picture.shape[1] - size) // 2 + 1
     seen = np.empty((rows * columns, size * size * picture.shape[2]), np.float32)
     for place in range(len(seen)):

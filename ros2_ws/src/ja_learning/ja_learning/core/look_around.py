@@ -1,4 +1,4 @@
-"""Which way to glance before the shift: what is never seen can never be chosen.
+"""Which way to glance before the shift: an object that is never seen can never be chosen.
 
 A glance is a look to a side, too short to be a fixation. It shows objects outside the first view,
 so that the learner may choose among more of them, and learn from more of them.
@@ -24,7 +24,7 @@ class LookAroundConfig(Configuration):
     look_around: str = parameter(
         'off',
         'glances before the shift: none, to both sides, or, once the learner knows something, '
-        'only where what she means may well be and has not been in view',
+        'only where the gaze target may well be and has not been in view',
         choices=('off', 'both_sides', 'where_worthwhile'),
     )
     glance_pan_rad: float = parameter(
@@ -38,14 +38,14 @@ class LookAroundConfig(Configuration):
     )
     glance_worth: float = parameter(
         0.1,
-        'a side is worth a glance when what she means would be newly seen there with this '
+        'a side is worth a glance when the gaze target would be newly seen there with this '
         'probability',
         low=0.0, high=1.0,
     )  # fmt: skip
 
 
 class LookAround:
-    """The views of one trial: taken, and still wanted."""
+    """The views of one trial: those taken, and those still to be taken."""
 
     def __init__(self, config: LookAroundConfig) -> None:
         self._config = config
@@ -53,11 +53,11 @@ class LookAround:
         self._left: list[NDArray[np.float64]] = []
         self._everywhere = False
 
-    def begin(self, look: ArrayLike, log_evidence: float) -> None:
-        """The head looks at the caregiver from this posture (2,) [rad].
+    def start_trial(self, look: ArrayLike, log_evidence: float) -> None:
+        """Start over: the head looks at the caregiver from this posture (2,) [rad].
 
-        `log_evidence` [nats]: that the learner knows something. Who knows nothing must look
-        everywhere, or would never see that the caregiver means what lies outside the first view.
+        `log_evidence` [nats]: that the learner knows something. A learner that knows nothing must
+        look everywhere, or it would never see gaze targets outside the first view.
         """
         c = self._config
         self._everywhere = c.look_around == 'both_sides' or log_evidence < c.knows_above_nats
@@ -67,11 +67,11 @@ class LookAround:
             aside = self._config.glance_pan_rad
             self._left = [self._taken[0] + [pan, 0.0] for pan in (aside, -aside)]
 
-    def rest(self, posture: ArrayLike) -> bool:
-        """The head rests at a posture (2,) [rad]: was it led there by nothing that the face told?
+    def observe_rest(self, posture: ArrayLike) -> bool:
+        """Note that the head rests at a posture (2,) [rad]; return whether it got there blindly.
 
-        So it is at the look and, if both sides are taken anyway, at the sides. Resting anywhere
-        else it has shifted, and glances no more.
+        Blindly means: not led by the face. This holds at the look and, if both sides are taken in
+        any case, at the sides. A rest anywhere else is a shift, which ends the glances.
         """
         for view in self._left:
             if _near(view, posture):
@@ -82,10 +82,10 @@ class LookAround:
             return False
         return self._everywhere or _near(self._taken[0], posture)
 
-    def wanted(self, believed: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64] | None:
-        """The next view (2,) [rad] that is worth its time, or None.
+    def next_view(self, believed: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64] | None:
+        """Return the next view (2,) [rad] that is worth its time, or None.
 
-        `believed` draws directions (n, 2) [rad] of what she may mean; asked only where it decides.
+        `believed` draws directions (n, 2) [rad] of the gaze target; called only where it decides.
         """
         if not self._left or self._everywhere:
             return next(iter(self._left), None)

@@ -15,14 +15,16 @@ INPUTS = FACE_SHAPE[0] * FACE_SHAPE[1] + 2
 
 
 class ThreeLayerNetwork:
-    """Face image and posture in, change of posture out (section 2.2.4; 30 x 25 + 2, 7, 2 units).
+    """The network from face image and posture to change of posture (section 2.2.4).
 
-    Hidden units are tanh, outputs linear. One step down the squared error a pair.
+    It has 30 x 25 + 2, 7 and 2 units. Hidden units are tanh, outputs linear. One step down the
+    squared error a pair.
     """
 
     kind = 'paper'
 
     def __init__(self, config: NetworkConfig, seed: int) -> None:
+        """Draw the initial weights from this seed."""
         self.config = config
         generator = torch.Generator().manual_seed(seed)
 
@@ -44,7 +46,7 @@ class ThreeLayerNetwork:
         self.last_error_rad = float('nan')
 
     def predict(self, face: ArrayLike, posture: ArrayLike) -> NDArray[np.float64]:
-        """Proposed changes of posture (..., 2) [rad]: faces (..., 30, 25), postures (..., 2)."""
+        """Return changes of posture (..., 2) [rad] for faces (..., 30, 25), postures (..., 2)."""
         with torch.no_grad():
             output = self._forward(self._inputs(np.asarray(face), np.asarray(posture, float)))
         return output.numpy().astype(float) * self.config.angle_scale_rad
@@ -52,21 +54,21 @@ class ThreeLayerNetwork:
     def propose(
         self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike
     ) -> NDArray[np.float64]:
-        """The same as `predict`: the paper's learner does not ask what was seen, or from where."""
+        """Return the same as `predict`: the paper's learner does not use the candidates."""
         return self.predict(face, posture)
 
     def belief(
         self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
     ) -> NDArray[np.float64]:
-        """Directions (count, 2) [rad] about the one that it proposes from the look."""
+        """Draw directions (count, 2) [rad] about the one that it proposes from the look."""
         off = self.config.believed_within_rad * rng.standard_normal((count, 2))
-        # Whoever attends to a face is turned towards it.
+        # A head that attends to a face is turned towards it.
         return np.asarray(face_at, float) + self.predict(face, face_at) + off
 
     def log_density(
         self, faces: ArrayLike, face_at: ArrayLike, directions: ArrayLike
     ) -> NDArray[np.float64]:
-        """log p [of 1 / rad^2] of directions (m, 2) given each of faces (n, 30, 25): (n, m)."""
+        """Return log p, (n, m) [of 1 / rad^2], of directions (m, 2) given faces (n, 30, 25)."""
         face_at, variance = np.asarray(face_at, float), self.config.believed_within_rad**2
         postures = np.broadcast_to(face_at, (len(np.asarray(faces)), 2))
         proposed = face_at + self.predict(faces, postures)
@@ -75,11 +77,11 @@ class ThreeLayerNetwork:
 
     @property
     def log_evidence(self) -> float:
-        """Evidence [nats] that the face tells this learner something, as in `Predictor`."""
+        """Return the evidence [nats] that the face informs this learner, as in `Predictor`."""
         return float(self._evidence.nats[0])
 
     def snapshot(self) -> 'ThreeLayerNetwork':
-        """A copy of what is believed now."""
+        """Copy what is believed now."""
         taken = copy.copy(self)
         taken._parameters = {
             name: torch.nn.Parameter(p.detach().clone()) for name, p in self._parameters.items()
@@ -87,10 +89,10 @@ class ThreeLayerNetwork:
         taken._evidence = copy.deepcopy(self._evidence)
         return taken
 
-    def learn(self, trial: Trial) -> None:
-        """Back-propagation on the pairs of one trial, one step a pair, in the order they came.
+    def update(self, trial: Trial) -> None:
+        """Back-propagate the pairs of one trial, one step a pair, in the order they came.
 
-        A trial that was given up teaches nothing.
+        A trial that was given up changes nothing.
         """
         if trial.fixation is None:
             return
@@ -119,7 +121,7 @@ class ThreeLayerNetwork:
             )
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Everything that learning has changed, as named arrays."""
+        """Return everything that learning has changed, as named arrays."""
         arrays = {name: p.detach().numpy().copy() for name, p in self._parameters.items()}
         for name, p in self._parameters.items():
             momentum = self._optimiser.state[p].get('momentum_buffer')
@@ -129,7 +131,7 @@ class ThreeLayerNetwork:
         return arrays | self._evidence.state()
 
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
-        """Take up the state of `state()`.
+        """Take the state of `state()`.
 
         Raises ValueError, and changes nothing, if it is another network's or not finite.
         """
@@ -166,7 +168,7 @@ class ThreeLayerNetwork:
 
 
 def face_inputs(faces: ArrayLike, scaling: str) -> NDArray[np.float64]:
-    """Faces, uint8 (..., 30, 25), as inputs (..., 750); `scaling` as in `NetworkConfig`."""
+    """Return faces, uint8 (..., 30, 25), as inputs (..., 750); `scaling`: see `NetworkConfig`."""
     faces = np.asarray(faces)
     pixels = faces.reshape(*faces.shape[:-2], -1) / 255.0 - 0.5
     if scaling == 'standardised':

@@ -1,4 +1,4 @@
-"""The trials that a learner has lived, to be lived again."""
+"""The trials that a learner remembers, to replay them."""
 
 from typing import Any
 
@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 from ja_learning.core.trial import FACE_SHAPE
 
 MOST_CANDIDATES = 32
-"""Of more objects seen in a trial, the first so many are remembered."""
+"""Of the objects seen in a trial, at most the first so many are remembered."""
 
 
 class ReplayMemory:
     """A ring of faces, uint8 (n, 30, 25), and the places seen with them, (n, m, 2), NaN-padded."""
 
     def __init__(self, capacity: int) -> None:
+        """Start empty; a full memory of `capacity` trials drops its oldest."""
         self._capacity = capacity
         self._faces = np.zeros((0, *FACE_SHAPE), np.uint8)
         self._places = np.zeros((0, MOST_CANDIDATES, 2), np.float32)
@@ -24,7 +25,7 @@ class ReplayMemory:
     def __len__(self) -> int:
         return self._count
 
-    def add(self, face: NDArray[np.uint8], places: NDArray[np.floating]) -> None:
+    def remember_trial(self, face: NDArray[np.uint8], places: NDArray[np.floating]) -> None:
         """Remember a face and the places (m, 2) seen with it; a full memory drops its oldest."""
         if self._count == len(self._faces) < self._capacity:
             self._grow()
@@ -35,8 +36,8 @@ class ReplayMemory:
         self._places[self._newest] = np.nan
         self._places[self._newest, : len(kept)] = kept
 
-    def at(self, ages: NDArray[np.int64]) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """Faces (..., 30, 25) and places (..., m, 2) of these ages, the newest 0; m as needed."""
+    def trials_at(self, ages: NDArray[np.int64]) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """Return faces (..., 30, 25) and places (..., m, 2) of these ages, the newest 0."""
         index = self._index(ages)
         widest = int(self._seen(index).max(initial=0))
         return self._faces[index], self._places[index, :widest]
@@ -44,12 +45,12 @@ class ReplayMemory:
     def places_at(
         self, ages: NDArray[np.int64], which: NDArray[np.floating]
     ) -> NDArray[np.float32]:
-        """One place (..., 2) of each of these ages: `which`, 0-1, of those that were seen."""
+        """Return one place (..., 2) of each of these ages: `which`, 0-1, of those seen."""
         index = self._index(ages)
         return self._places[index, (which * self._seen(index)).astype(int)]
 
     def counts(self, newest: int) -> NDArray[np.int64]:
-        """How many objects were seen in each of so many newest trials."""
+        """Return how many objects were seen in each of so many newest trials."""
         return self._seen(self._index(np.arange(min(newest, self._count))))
 
     def keep_newest(self, count: int) -> None:
@@ -57,8 +58,8 @@ class ReplayMemory:
         self._count = min(count, self._count)
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """All that is remembered, oldest first, as named arrays."""
-        faces, places = self.at(np.arange(self._count)[::-1])
+        """Return all that is remembered, oldest first, as named arrays."""
+        faces, places = self.trials_at(np.arange(self._count)[::-1])
         there = ~np.isnan(places[..., 0])
         return {
             'faces': faces,
@@ -68,7 +69,7 @@ class ReplayMemory:
 
     @classmethod
     def restored(cls, arrays: dict[str, NDArray[Any]], capacity: int) -> 'ReplayMemory':
-        """A memory of `state()`; KeyError or ValueError if it is none."""
+        """Make a memory from `state()`; KeyError or ValueError if it is none."""
         faces, counts, places = (
             arrays[name] for name in ('faces', 'candidate_counts', 'candidates')
         )
@@ -78,7 +79,7 @@ class ReplayMemory:
             raise ValueError(f'candidates {places.shape} do not fit their counts {counts}')
         memory = cls(capacity)
         for face, seen in zip(faces, np.split(places, np.cumsum(counts))[:-1], strict=True):
-            memory.add(face, seen)
+            memory.remember_trial(face, seen)
         return memory
 
     def _index(self, ages: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -89,7 +90,7 @@ class ReplayMemory:
 
     def _grow(self) -> None:
         more = min(max(64, self._count), self._capacity - self._count)
-        faces, places = self.at(np.arange(self._count)[::-1])
+        faces, places = self.trials_at(np.arange(self._count)[::-1])
         self._faces = np.concatenate([faces, np.zeros((more, *FACE_SHAPE), np.uint8)])
         padded = np.full((self._count + more, MOST_CANDIDATES, 2), np.nan, np.float32)
         padded[: self._count, : places.shape[-2]] = places

@@ -1,7 +1,8 @@
-"""A trial as the learner lives it: a face, the postures visited, what was fixated in the end.
+"""A trial: a face, the postures visited, the objects seen, and what was fixated in the end.
 
-Nobody announces a trial. It begins with a look at the caregiver and ends with the first fixation
-after it, or is given up: the head looks at her again. What was seen was seen in any case.
+No message announces a trial. It begins with a look at the caregiver. It ends with the first
+fixation after the look, or is given up when the head looks at her again. A trial that was given up
+keeps the objects that were seen in it.
 """
 
 import math
@@ -21,12 +22,12 @@ SAME_POSTURE_RAD = 0.02
 
 
 def same_posture(a: ArrayLike, b: ArrayLike, within_rad: float = SAME_POSTURE_RAD) -> bool:
-    """Whether two postures (2,) [rad] are nearer than this in both joints."""
+    """Return whether two postures (2,) [rad] are nearer than this in both joints."""
     return bool(np.all(np.abs(np.subtract(a, b)) < within_rad))
 
 
 def checked_face(face: ArrayLike) -> NDArray[np.uint8]:
-    """The picture, uint8 (30, 25), of a face. Raises ValueError when it is something else."""
+    """Return the picture of a face, uint8 (30, 25). Raise ValueError when it is something else."""
     face = np.asarray(face)
     if face.shape != FACE_SHAPE or face.dtype != np.uint8:
         raise ValueError(
@@ -38,13 +39,13 @@ def checked_face(face: ArrayLike) -> NDArray[np.uint8]:
 
 @dataclass(frozen=True)
 class Trial:
-    """What one trial gives to learn from.
+    """One trial, finished: all that a learner learns from.
 
     `face`: uint8 (30, 25), seen in the direction `face_at`, (2,) [rad]. `postures`: (n, 2) [rad],
     where each shift began, the look at the caregiver first. `fixation`: (2,) [rad], direction of
     the object fixated at the end, or None when the trial was given up.
     `candidates`: (m, 2) [rad], directions of all objects that were seen meanwhile; the first
-    `seen_before_shift` of them were seen before anybody acted on what the face told.
+    `seen_before_shift` of them were seen before the head acted on the face.
     """
 
     face: NDArray[np.uint8]
@@ -56,13 +57,13 @@ class Trial:
 
     @property
     def led_to(self) -> NDArray[np.float64]:
-        """The fixation, (2,) [rad]; ValueError when the trial was given up."""
+        """Return the fixation, (2,) [rad]; ValueError when the trial was given up."""
         if self.fixation is None:
-            raise ValueError('a trial that was given up has led nowhere')
+            raise ValueError('a trial that was given up has no fixation')
         return self.fixation
 
     def displacements(self) -> NDArray[np.float64]:
-        """What remained to turn at each posture, shape (n, 2) [rad]: the target of learning."""
+        """Return what remained to turn at each posture, (n, 2) [rad]: the target of learning."""
         return self.led_to - self.postures
 
 
@@ -70,6 +71,7 @@ class TrialRecorder:
     """Cuts the stream of looks, postures at rest and fixations into trials."""
 
     def __init__(self, same_within_rad: float = SAME_POSTURE_RAD) -> None:
+        """Start between two trials; postures nearer than this in both joints are the same."""
         self._same_within = same_within_rad
         self._face: NDArray[np.uint8] | None = None
         self._face_at = np.zeros(2)
@@ -80,18 +82,20 @@ class TrialRecorder:
 
     @property
     def face(self) -> NDArray[np.uint8] | None:
-        """The face seen in the last look of the trial under way, or None between trials."""
+        """Return the face seen in the last look of the trial under way, or None between trials."""
         return self._face
 
-    def look(self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike) -> Trial | None:
-        """The head attends to the caregiver: a trial begins, or its look goes on.
+    def observe_face(
+        self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike
+    ) -> Trial | None:
+        """Start a trial, or go on with its look: the head attends to the caregiver.
 
-        Her face is seen in the direction `face_at` (2,) [rad].
-        The trial before, if it was given up.
+        Her face is seen in the direction `face_at` (2,) [rad], from this posture (2,) [rad].
+        Returns the trial before, if it was given up.
         """
         given_up = None
         if self._face is not None and len(self._postures) > 1:
-            given_up = self._ended(self._postures, None)
+            given_up = self._finished(self._postures, None)
         self._face, self._face_at = checked_face(face), np.array(face_at, float)
         self._postures = [np.array(posture, float)]
         self._candidates = []
@@ -99,27 +103,27 @@ class TrialRecorder:
         self._looking_around = True
         return given_up
 
-    def rest(self, posture: ArrayLike) -> None:
-        """The head stands still at a posture (2,) [rad]; repeated postures count once."""
+    def observe_rest(self, posture: ArrayLike) -> None:
+        """Record a posture (2,) [rad] at which the head stands still, once if it repeats."""
         if self._face is not None and not self._same(posture, self._postures[-1]):
             self._postures.append(np.array(posture, float))
 
-    def shift(self) -> None:
-        """From here to the next look, the head turns where somebody believes that she looks."""
+    def observe_shift(self) -> None:
+        """Note that the head acts on the face: candidates from here on do not count as blind."""
         self._looking_around = False
 
     @property
     def face_at(self) -> NDArray[np.float64]:
-        """Direction (2,) [rad] in which the face was last seen."""
+        """Return the direction (2,) [rad] in which the face was last seen."""
         return self._face_at
 
     @property
     def candidates(self) -> NDArray[np.float64]:
-        """Directions (m, 2) [rad] of the objects seen in the trial under way."""
+        """Return the directions (m, 2) [rad] of the objects seen in the trial under way."""
         return np.array(self._candidates).reshape(-1, 2)
 
-    def see(self, directions: ArrayLike) -> None:
-        """Objects stand in these directions (m, 2) [rad], seen while the head stands still."""
+    def record_candidates(self, directions: ArrayLike) -> None:
+        """Record the directions (m, 2) [rad] of objects seen while the head stands still."""
         if self._face is None:
             return
         for direction in np.asarray(directions, float).reshape(-1, 2).tolist():
@@ -133,21 +137,22 @@ class TrialRecorder:
         if self._looking_around:
             self._seen_before_shift = len(self._candidates)
 
-    def fixate(self, posture: ArrayLike, direction: ArrayLike) -> Trial | None:
-        """An object in this direction is fixated from this posture: the trial, if one was open.
+    def observe_fixation(self, posture: ArrayLike, direction: ArrayLike) -> Trial | None:
+        """End the trial: an object in this direction (2,) [rad] is fixated from this posture.
 
-        What stands in the centre while the head has not yet left the caregiver ends nothing.
+        Returns the trial, or None when none was under way. A fixation while the head has not yet
+        left the caregiver ends no trial.
         """
         began = self._postures
         if began and self._same(posture, began[-1]):
             began = began[:-1]  # where the last shift ended, none began
         if self._face is None or not began:
             return None
-        trial = self._ended(began, np.array(direction, float))
-        self.forget()
+        trial = self._finished(began, np.array(direction, float))
+        self.drop_trial()
         return trial
 
-    def _ended(
+    def _finished(
         self, began: list[NDArray[np.float64]], fixation: NDArray[np.float64] | None
     ) -> Trial:
         assert self._face is not None
@@ -160,7 +165,7 @@ class TrialRecorder:
             self._seen_before_shift,
         )
 
-    def forget(self) -> None:
+    def drop_trial(self) -> None:
         """Drop the trial under way."""
         self._face = None
         self._postures = []

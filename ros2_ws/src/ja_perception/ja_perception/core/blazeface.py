@@ -17,7 +17,7 @@ _SAME_FACE_IOU = 0.3
 
 
 def _anchor_centres() -> NDArray[np.float32]:
-    """Centres of the 896 anchors, shape (896, 2), as shares of the input's side."""
+    """Return the centres of the 896 anchors, shape (896, 2), as shares of the input's side."""
     grids = []
     for cells, anchors in _GRIDS:
         axis = (np.arange(cells, dtype=np.float32) + 0.5) / cells
@@ -27,7 +27,7 @@ def _anchor_centres() -> NDArray[np.float32]:
 
 
 class BlazeFace:
-    """The default face detector: about 2 ms a look on one core, heads turned up to 60 degrees.
+    """The default face detector: about 2 ms a search on one core, heads turned up to 60 degrees.
 
     ``least_score`` is the confidence (0-1) below which a face is not reported.
     """
@@ -45,8 +45,8 @@ class BlazeFace:
     def find_faces(self, image: NDArray[np.uint8], square: Box) -> list[Face]:
         """See ``FaceFinder.find_faces``."""
         scale = _INPUT / square.width
-        look = cut_square(image, square, _INPUT)
-        blob = cv2.dnn.blobFromImage(look, 1 / 127.5, mean=(127.5, 127.5, 127.5))
+        cut = cut_square(image, square, _INPUT)
+        blob = cv2.dnn.blobFromImage(cut, 1 / 127.5, mean=(127.5, 127.5, 127.5))
         self._net.setInput(blob)
         logits, values = self._net.forward(self._outputs)
         logits = logits.reshape(-1)
@@ -71,7 +71,7 @@ class BlazeFace:
 def _blended(
     values: NDArray[np.float64], scores: NDArray[np.float64]
 ) -> list[tuple[NDArray[np.float64], float]]:
-    """Non-maximum suppression that averages overlapping boxes by their scores.
+    """Suppress non-maxima: average overlapping boxes, weighted by their scores.
 
     Averaging instead of taking the best is what makes BlazeFace's box steady between frames.
     """

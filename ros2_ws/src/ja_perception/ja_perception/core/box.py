@@ -23,38 +23,41 @@ class Box(NamedTuple):
 
     @property
     def left(self) -> float:
+        """Return the left edge [px]."""
         return self.u - self.width / 2
 
     @property
     def top(self) -> float:
+        """Return the upper edge [px]."""
         return self.v - self.height / 2
 
     @property
     def area(self) -> float:
+        """Return the area [px^2]."""
         return self.width * self.height
 
     def scaled(self, factor: float) -> 'Box':
-        """The same place in an image ``factor`` times as large."""
+        """Return the same place in an image ``factor`` times as large."""
         u, v = (self.u + 0.5) * factor - 0.5, (self.v + 0.5) * factor - 0.5
         return Box(u, v, self.width * factor, self.height * factor)
 
     def overlap(self, other: 'Box') -> float:
-        """Share of the smaller box that lies in the other, 0-1."""
+        """Return the share of the smaller box that lies in the other, 0-1."""
         return float(overlaps([self], [other])[0, 0])
 
 
 def scaled(boxes: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
-    """``Box.scaled`` of each of the boxes (n, 4)."""
+    """Return ``Box.scaled`` of each of the boxes (n, 4)."""
     return (boxes + _PIXEL_CENTRE) * factor - _PIXEL_CENTRE
 
 
 def corners(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Left, top, right and bottom, shape (n, 4), of boxes (n, 4)."""
+    """Return left, top, right and bottom, shape (n, 4), of boxes (n, 4)."""
     return boxes @ _CORNERS
 
 
 def overlaps(boxes: ArrayLike, others: ArrayLike) -> NDArray[np.float64]:
-    """``Box.overlap`` of each of ``boxes`` (n, 4) with each of ``others`` (m, 4), (n, m)."""
+    """Return ``Box.overlap`` of ``boxes`` (n, 4) with ``others`` (m, 4), shape (n, m)."""
     one = np.asarray(boxes, float).reshape(-1, 1, 4)
     other = np.asarray(others, float).reshape(1, -1, 4)
     first, second = corners(one), corners(other)

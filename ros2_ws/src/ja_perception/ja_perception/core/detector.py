@@ -40,7 +40,7 @@ class AttentionConfig(Configuration):
 
 @dataclass(frozen=True)
 class DetectorConfig:
-    """All that can be tuned."""
+    """All parameters of the detector."""
 
     attention: AttentionConfig = field(default_factory=AttentionConfig)
     interest: InterestConfig = field(default_factory=InterestConfig)
@@ -53,13 +53,13 @@ class DetectorConfig:
 
 @dataclass(frozen=True)
 class Percept:
-    """What one image holds.
+    """The faces and objects of one image.
 
     ``detections``: the caregiver's face first, other faces, then objects, most salient first.
     ``face_image``: (30, 25) uint8 while the head attends to the caregiver, cut from
     ``face_image_box`` [px]; else both are None. ``motion_judged``: False where motion could not
-    be told (alpha_mot = 0, the first images, a fast head). ``moving_share``: share of the image
-    that moves.
+    be measured (alpha_mot = 0, the first images, a fast head). ``moving_share``: share of the
+    image that moves.
     """
 
     detections: list[Detection]
@@ -70,7 +70,7 @@ class Percept:
 
     @property
     def target(self) -> Detection | None:
-        """The object i_trg of Eq. 1."""
+        """Return the object i_trg of Eq. 1; None when no object is seen."""
         return most_salient(self.detections)
 
 
@@ -84,7 +84,7 @@ class SalientFeatureDetector:
         self.reset()
 
     def reset(self) -> None:
-        """Start anew, as if nothing had been seen."""
+        """Reset to the state before the first image."""
         config = self._config
         self._faces = FaceTracker(self._finder, config.faces)
         self._objects = SalientObjects(
@@ -98,7 +98,7 @@ class SalientFeatureDetector:
         camera: CameraModel,
         posture: Posture | None,
     ) -> Percept:
-        """What is seen in an (H, W, 3) uint8 RGB image.
+        """Detect faces and salient objects in an (H, W, 3) uint8 RGB image.
 
         ``posture`` is the head's at the image's stamp. Without one (None) the camera is taken to
         stand still in the base frame, and no face counts as attended: whether the head is still is
@@ -136,7 +136,7 @@ class SalientFeatureDetector:
         )
 
     def _attends(self, ray: NDArray[np.float64], posture: Posture | None) -> bool:
-        """Does the head rest with the ray (x, y) in the centre (Eq. 3)?"""
+        """Return whether the head rests with the ray (x, y) in the centre (Eq. 3)."""
         if posture is None or not posture.is_still(self._config.attention.still_below_rad_s):
             return False
         return stands_in_centre(ray, self._config.attention.d_th_rad)
@@ -147,5 +147,5 @@ class SalientFeatureDetector:
 
 
 def _whole_head(face: Box) -> Box:
-    """The head with hair, ears and neck around the box of a face."""
+    """Return the box of the head, with hair, ears and neck, around the box of a face."""
     return Box(face.u, face.v, 1.5 * face.width, 1.8 * face.height)

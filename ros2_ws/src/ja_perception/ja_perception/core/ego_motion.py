@@ -1,4 +1,4 @@
-"""What the camera would see now if only the head had moved since the previous image."""
+"""The view expected now if only the head has moved since the previous image."""
 
 import math
 
@@ -18,7 +18,7 @@ _BENT_PX = 0.5
 def rotation_homography(
     camera: CameraModel, head_now: NDArray[np.float64], head_before: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """H = K R_now R_before^T K^-1, shape (3, 3): pixels of the image before -> pixels now.
+    """Return H = K R_now R_before^T K^-1, (3, 3): pixels of the image before -> pixels now.
 
     R turns the base frame into the optical frame. ``head_now`` and ``head_before`` are the
     ``head_rotation`` (3, 3) of the postures at the images' stamps. The camera turns about its
@@ -32,7 +32,10 @@ def rotation_homography(
 def expected_image(
     before: NDArray[np.uint8], homography: NDArray[np.float64]
 ) -> NDArray[np.uint8]:
-    """The (H, W) image before, which is nowhere 0, as expected now: 0 where it had no view."""
+    """Return the (H, W) image before, warped to the view now; 0 where it had no view.
+
+    The image before must be nowhere 0.
+    """
     height, width = before.shape
     if not _in_front(width, height, homography):
         return np.zeros_like(before)
@@ -44,7 +47,7 @@ def expected_image(
 
 
 def _in_front(width: int, height: int, homography: NDArray[np.float64]) -> bool:
-    """Does the whole image before lie in front of the camera now?"""
+    """Return whether the whole image before lies in front of the camera now."""
     across, down, depth = homography[2].tolist()
     return depth + min(0.0, across * width) + min(0.0, down * height) > 1e-6
 
@@ -52,7 +55,7 @@ def _in_front(width: int, height: int, homography: NDArray[np.float64]) -> bool:
 def _affine(
     width: int, height: int, homography: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
-    """The affine map (2, 3) that is the homography around the centre; None where that bends."""
+    """Return the affine map (2, 3) near the homography; None where perspective bends more."""
     right, down = width / 2, height / 2
     # With a depth of 1 at the centre, it is 1 + slope @ (u, v, 1) elsewhere.
     unit = homography / float(homography[2] @ (right, down, 1.0))

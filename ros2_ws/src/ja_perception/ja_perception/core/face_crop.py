@@ -12,9 +12,9 @@ _FINER = 4
 
 
 def crop_face(grey: NDArray[np.uint8], box: Box) -> NDArray[np.uint8]:
-    """The part of an (H, W) image in ``box``, (30, 25) uint8, placed to a fraction of a pixel.
+    """Return the part of an (H, W) image in ``box``, (30, 25) uint8, with sub-pixel position.
 
-    What lies beyond the image repeats its border.
+    Beyond the image its border is repeated.
     """
     columns, rows = FACE_COLUMNS * _FINER, FACE_ROWS * _FINER
     step_u, step_v = box.width / columns, box.height / rows

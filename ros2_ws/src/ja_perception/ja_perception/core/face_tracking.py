@@ -1,9 +1,9 @@
-"""Keeps an eye on faces from image to image: where to look for them, and which is the caregiver's.
+"""Tracks faces from image to image: where to search for them, and which is the caregiver's.
 
-A face is remembered by its direction from the base, so that the head's own motion does not lose
-it. Looks are at the caregiver, unless her face is unchanged, and at the next place of a scan that
-goes round the picture in squares of several sizes: one look an image, two where she is missing or
-keeps the scan waiting for long.
+A face is stored by its direction from the base, so that the head's own motion does not lose it.
+An image is searched where the caregiver is expected, unless her face is unchanged, and in the next
+square of a scan that covers the picture in several sizes. That is one search an image; two where
+she is missing, or where the scan has waited for long.
 """
 
 from dataclasses import dataclass
@@ -21,16 +21,16 @@ from ja_perception.core.box import Box
 from ja_perception.core.face_crop import FACE_COLUMNS, FACE_ROWS, crop_face
 from ja_perception.core.faces import Face, FaceFinder, without_doubles
 
-# A look at a known face takes this many face widths, which is what the detectors are trained on.
+# A search for a known face takes this many face widths: the detectors are trained on that.
 _SEARCH_WIDTHS = 2.5
-# A look that would take more than this share of the picture takes the whole.
+# A search of more than this share of the picture takes the whole.
 _NEARLY_WHOLE = 0.6
-# Smaller faces hold too few pixels to be known for faces.
+# Smaller faces hold too few pixels to be detected.
 _LEAST_FACE_PX = 20
 # A square of the scan is this many times smaller than the next larger one.
 _SCAN_STEP = 0.6
 _SCAN_OVERLAP = 0.3
-# Sightings that share more than this are of one face.
+# Detections that share more than this are of one face.
 _SAME_OVERLAP = 0.3
 # A resting face is found within this distance from its mean (in face widths).
 _JITTER_WIDTHS = 0.06
@@ -46,14 +46,14 @@ class FaceConfig(Configuration):
     """How faces are searched for and remembered."""
 
     new_face_score: float = parameter(
-        0.7, 'confidence that a face needs in two looks to be taken for one', low=0.0, high=1.0
+        0.7, 'confidence that a new face needs in two searches', low=0.0, high=1.0
     )
     smallest_face_share: float = parameter(
         0.0625, 'smallest face searched for (share of the width of the image)', low=0.01, high=1.0
     )
     scan_every: int = parameter(
         5,
-        'images from one scanning look to the next while the caregiver is known (twice as many '
+        'images from one step of the scan to the next while the caregiver is known (twice as many '
         'while she moves)',
         low=1, high=1000,
     )  # fmt: skip
@@ -66,16 +66,16 @@ class FaceConfig(Configuration):
         low=0.0, high=60.0,
     )  # fmt: skip
     face_averaging: int = parameter(
-        20, 'sightings over which the place of a resting face is averaged', low=1, high=1000
+        20, 'detections over which the place of a resting face is averaged', low=1, high=1000
     )
 
 
 class FaceTrack:
-    """A face over time, steadied: the detector's box jitters, and jitter would look like gaze.
+    """A face over time, smoothed: the detector's box jitters, and jitter would look like gaze.
 
-    The direction is averaged while the sightings stay within the detector's jitter, and follows
-    at once when they do not: a head that turns carries its box along. The size, which says only
-    how far away the person is, is averaged for longer.
+    The direction is averaged while the detections stay within the detector's jitter, and follows
+    at once when they do not: a head that turns carries its box along. The size shows only how far
+    away the person is; it is averaged for longer.
     """
 
     def __init__(self, track_id: int) -> None:
@@ -85,42 +85,42 @@ class FaceTrack:
         """Time in view since it was last found."""
         self._direction = np.zeros(2)
         self._size = np.zeros(2)
-        self._sightings = 0
+        self._detections = 0
         self._sizes = 0
         self._picture: NDArray[np.uint8] | None = None
 
     def update(self, direction: ArrayLike, size: ArrayLike, score: float, longest: int) -> None:
-        """Take in a sighting: direction [rad] and box size (width, height) at unit focal length.
+        """Update from a detection: direction [rad], box size (width, height) at unit focal length.
 
-        ``longest``: sightings of a resting face over which its direction is averaged.
+        ``longest``: detections of a resting face over which its direction is averaged.
         """
         direction, size = np.asarray(direction, float), np.asarray(size, float)
         if angle_between(direction, self._direction) > _JITTER_WIDTHS * size[0]:
-            self._sightings = 0
+            self._detections = 0
         if abs(size[0] - self._size[0]) > _OTHER_SIZE * self._size[0]:
             self._sizes = 0
-        self._sightings = min(self._sightings + 1, longest)
+        self._detections = min(self._detections + 1, longest)
         self._sizes = min(self._sizes + 1, _SIZES)
-        self._direction = self._direction + (direction - self._direction) / self._sightings
+        self._direction = self._direction + (direction - self._direction) / self._detections
         self._size = self._size + (size - self._size) / self._sizes
         self.score, self.missed_s = score, 0.0
 
     def ray(self, posture: ArrayLike) -> NDArray[np.float64]:
-        """Ray (x, y) to the face from a posture; NaN when behind."""
+        """Return the ray (x, y) to the face from a posture; NaN when behind."""
         return rays_of_directions(posture, self._direction)
 
     def box(self, camera: CameraModel, posture: ArrayLike) -> Box:
-        """Where the face is seen from a posture [px]; NaN when behind."""
+        """Return the box of the face in the image from a posture [px]; NaN when behind."""
         u, v = camera.pixels(self.ray(posture)).tolist()
         width, height = (self._size * (camera.fx, camera.fy)).tolist()
         return Box(u, v, width, height)
 
     def store_picture(self, grey: NDArray[np.uint8], box: Box) -> None:
-        """Keep its picture, cut from an (H, W) image, for ``is_unchanged``."""
+        """Store its picture, cut from an (H, W) image, for ``is_unchanged``."""
         self._picture = crop_face(grey, box)
 
     def is_unchanged(self, grey: NDArray[np.uint8], box: Box) -> bool:
-        """Does the face look as it did when it was last found?"""
+        """Return whether the face looks as it did when it was last found."""
         if self._picture is None:
             return False
         return cv2.norm(crop_face(grey, box), self._picture, cv2.NORM_L1) < _UNCHANGED_L1
@@ -136,9 +136,11 @@ class _ImageView:
     posture: NDArray[np.float64]
 
     def box(self, face: FaceTrack) -> Box:
+        """Return the box of a face in this image [px]."""
         return face.box(self.camera, self.posture)
 
     def shows(self, face: FaceTrack) -> bool:
+        """Return whether the place of a face lies in this image."""
         return self.camera.contains(self.camera.pixels(face.ray(self.posture)))
 
 
@@ -163,18 +165,19 @@ class FaceTracker:
         posture: NDArray[np.float64],
         stamp_ns: int,
     ) -> list[FaceTrack]:
-        """The faces in view of an (H, W, 3) RGB image, (H, W) in grey; the caregiver's first.
+        """Return the faces in view of an (H, W, 3) RGB image, the caregiver's first.
 
-        ``posture`` (pan, tilt) [rad] at the image's stamp. The caregiver is the largest face when
-        none was known, and stays so until her face is forgotten.
+        ``grey``: the same image, (H, W). ``posture``: (pan, tilt) [rad] at its stamp. The
+        caregiver is the largest face when none was known, and stays so until her face is
+        forgotten.
         """
         view = _ImageView(image, grey, camera, posture)
         elapsed_s = self._elapsed(stamp_ns)
         expected = [face for face in self._faces if view.shows(face)]
         for face in expected:
             face.missed_s += elapsed_s
-        for sighting in self._find_faces(view, expected):
-            self._update_track(sighting, view, expected)
+        for found in self._find_faces(view, expected):
+            self._update_track(found, view, expected)
         self._forget(expected)
         present = [
             face
@@ -226,10 +229,11 @@ class FaceTracker:
         return smallest_px / self._finder.smallest_share
 
     def _scan_is_due(self, expected: list[FaceTrack], busy: bool) -> bool:
-        """In every image while the caregiver is unknown or not in place, else every so many.
+        """Return whether this image gets a scan: each one while the caregiver is not found.
 
-        A scan waits for an image in which she needs no look (``busy``), as many images again at
-        most: looks are what an image costs, and the latest command is as late as the dearest one.
+        Otherwise every ``scan_every`` images get one. A scan waits while she is searched for
+        (``busy``), as many images again at most: searches are what an image costs, and the slowest
+        image decides how late a command can be.
         """
         caregiver, period = self._caregiver, self._config.scan_every
         lost = caregiver is None or (
@@ -245,7 +249,7 @@ class FaceTracker:
     def _confirm_new_face(
         self, image: NDArray[np.uint8], face: Face, square: Box, whole: Box
     ) -> list[Face]:
-        """A face seen for the first time must be seen again, framed as faces are at best."""
+        """Search again for a new face, in a square that frames it well; return what is found."""
         least = self._config.new_face_score
         if face.score < least:
             return []
@@ -276,20 +280,20 @@ class FaceTracker:
 
 
 def whole_square(width: int, height: int) -> Box:
-    """The square that holds a whole image, concentric with it."""
+    """Return the square that holds a whole image, concentric with it."""
     side = max(width, height)
     return Box((width - 1) / 2, (height - 1) / 2, side, side)
 
 
 def search_square(face: Box, whole: Box) -> Box:
-    """The square to search for a face that is expected in ``face``."""
+    """Return the square to search for a face that is expected in ``face``."""
     side = _SEARCH_WIDTHS * max(face.width, face.height)
     return whole if side > _NEARLY_WHOLE * whole.width else Box(face.u, face.v, side, side)
 
 
 @lru_cache(maxsize=8)
 def scan_squares(width: int, height: int, smallest: float) -> list[Box]:
-    """Squares that cover an image at several sizes, overlapping, the largest first."""
+    """Return overlapping squares that cover an image at several sizes, the largest first."""
     squares = [whole_square(width, height)]
     side = squares[0].width * _SCAN_STEP
     while side >= smallest:
@@ -303,7 +307,7 @@ def scan_squares(width: int, height: int, smallest: float) -> list[Box]:
 
 
 def _centres_along(length: int, side: float) -> list[float]:
-    """Centres of squares of ``side`` that cover ``length`` pixels with overlap."""
+    """Return the centres of squares of ``side`` that cover ``length`` pixels with overlap."""
     if side >= length:
         return [(length - 1) / 2]
     count = 1 + int(np.ceil((length - side) / (side * (1 - _SCAN_OVERLAP))))

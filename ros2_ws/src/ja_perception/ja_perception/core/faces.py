@@ -24,37 +24,37 @@ class Face:
 
 
 class FaceFinder(Protocol):
-    """Finds faces in one square look at an image."""
+    """Finds faces in one square of an image."""
 
     smallest_share: float
-    """The smallest face found, as a share of the side of the square looked at."""
+    """The smallest face found, as a share of the side of the square."""
 
     def find_faces(self, image: NDArray[np.uint8], square: Box) -> list[Face]:
-        """Faces in ``square`` of an (H, W, 3) RGB image; the square may reach beyond it."""
+        """Return the faces in ``square`` of an (H, W, 3) RGB image; it may reach beyond."""
         ...
 
 
 def cut_square(image: NDArray[np.uint8], square: Box, side: int) -> NDArray[np.uint8]:
-    """The part of ``image`` in ``square``, scaled to ``(side, side, 3)``; black outside."""
+    """Return the part of ``image`` in ``square``, scaled to (side, side, 3); black outside."""
     height, width = image.shape[:2]
     left, top = round(square.left), round(square.top)
     size = round(square.width)
     x0, y0 = max(left, 0), max(top, 0)
     x1, y1 = min(left + size, width), min(top + size, height)
-    look = np.zeros((side, side, 3), np.uint8)
+    cut = np.zeros((side, side, 3), np.uint8)
     if x1 <= x0 or y1 <= y0:
-        return look
+        return cut
     scale = side / size
     a, b = round((x0 - left) * scale), round((y0 - top) * scale)
     c, d = round((x1 - left) * scale), round((y1 - top) * scale)
     if c > a and d > b:
         shrink = cv2.INTER_AREA if scale < 0.75 else cv2.INTER_LINEAR
-        cv2.resize(image[y0:y1, x0:x1], (c - a, d - b), dst=look[b:d, a:c], interpolation=shrink)
-    return look
+        cv2.resize(image[y0:y1, x0:x1], (c - a, d - b), dst=cut[b:d, a:c], interpolation=shrink)
+    return cut
 
 
 def without_doubles(faces: list[Face], most_overlap: float = 0.4) -> list[Face]:
-    """The faces, most confident first, less those that a more confident one overlaps."""
+    """Return the faces, most confident first, without those that a more confident one overlaps."""
     kept: list[Face] = []
     for face in sorted(faces, key=lambda f: -f.score):
         if all(face.box.overlap(other.box) <= most_overlap for other in kept):

@@ -47,7 +47,7 @@ class ColourMap:
 
 
 def colour_map(rgb: NDArray[np.uint8], config: FeatureConfig) -> ColourMap:
-    """Pixels whose colour is saturated and not dark, with their hue, of an (H, W, 3) RGB image."""
+    """Return where an (H, W, 3) RGB image is saturated and not dark, and each pixel's hue."""
     hsv = cv2.cvtColor(rgb, cv2.COLOR_RGB2HSV)
     least = (0.0, 255 * config.colour_saturation, 255 * config.colour_value)
     bright = cv2.inRange(hsv, least, (255.0, 255.0, 255.0))
@@ -55,7 +55,7 @@ def colour_map(rgb: NDArray[np.uint8], config: FeatureConfig) -> ColourMap:
 
 
 def edge_map(grey: Mask, config: FeatureConfig) -> Mask:
-    """Pixels at which the brightness of an (H, W) image steps."""
+    """Return the pixels at which the brightness of an (H, W) image steps."""
     steps = np.zeros_like(grey)
     cv2.absdiff(grey[:, 1:], grey[:, :-1], dst=steps[:, 1:])
     cv2.max(steps[1:], cv2.absdiff(grey[1:], grey[:-1]), dst=steps[1:])
@@ -63,7 +63,7 @@ def edge_map(grey: Mask, config: FeatureConfig) -> Mask:
 
 
 def motion_map(grey: Mask, expected: Mask, config: FeatureConfig) -> Mask:
-    """Pixels whose brightness is not found near the same place in the ``expected`` image.
+    """Return the pixels whose brightness does not occur nearby in the ``expected`` image.
 
     Each pixel may take any brightness that its 3x3 neighbours were expected to have: an error of
     one pixel in the compensation of the head's motion is no motion. Where 0 is expected there was
@@ -78,11 +78,11 @@ def motion_map(grey: Mask, expected: Mask, config: FeatureConfig) -> Mask:
 
 
 def without_specks(mask: Mask) -> Mask:
-    """The mask without what is thinner than two pixels: noise."""
+    """Return the mask without what is thinner than two pixels: noise."""
     # Opposite anchors: with its default ones an even kernel shifts the mask by a pixel.
     return cv2.dilate(cv2.erode(mask, _SPECK, anchor=(0, 0)), _SPECK, anchor=(1, 1))
 
 
 def _above(values: Mask, threshold: float) -> Mask:
-    """1 where a value is above the threshold, else 0."""
+    """Return 1 where a value is above the threshold, else 0."""
     return cv2.threshold(values, threshold, 1, cv2.THRESH_BINARY)[1]

@@ -12,7 +12,7 @@ _PICTURE_SUFFIXES = {'.png', '.jpg', '.jpeg', '.bmp', '.tif', '.tiff', '.webp', 
 
 
 class SourceError(ValueError):
-    """A source that gives no pictures; the text says which, why and what to do."""
+    """A source without pictures; the text names it, the reason and what to do."""
 
 
 class FrameSource(Protocol):
@@ -22,19 +22,22 @@ class FrameSource(Protocol):
     """The source's own rate; None when it has none."""
 
     def next_frame(self) -> NDArray[np.uint8] | None:
-        """The next picture, or None at the end. Raises ``SourceError`` when the device is gone."""
+        """Return the next picture; None at the end.
+
+        Raises ``SourceError`` when the device is gone.
+        """
         ...
 
     def close(self) -> None:
-        """Give the device or file back."""
+        """Release the device or file."""
         ...
 
 
 def open_source(source: str, loop: bool, still_frames: int) -> FrameSource:
     """Open ``source``: a device number or path, a video file, a folder of images, or one image.
 
-    With ``loop`` files and folders begin anew at their end. Each picture of a folder is given
-    ``still_frames`` times; a single image is given for ever.
+    With ``loop`` files and folders restart at their end. Each picture of a folder is returned
+    ``still_frames`` times; a single image is returned for ever.
     Raises ``SourceError`` when it cannot be opened or holds no picture.
     """
     if source.isdigit() or source.startswith('/dev/'):
@@ -71,7 +74,9 @@ class Device:
         """See ``FrameSource``."""
         got, bgr = self._capture.read()
         if not got:
-            raise SourceError(f"camera '{self._source}' gives no more pictures: is it unplugged?")
+            raise SourceError(
+                f"camera '{self._source}' delivers no more pictures: is it unplugged?"
+            )
         return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
 
     def close(self) -> None:
@@ -104,7 +109,7 @@ class Video:
         self._capture.release()
 
     def _rewind(self) -> None:
-        # Opening anew is exact for every container; seeking is not.
+        # Opening the file again is exact for every container; seeking is not.
         self._capture.release()
         self._capture = cv2.VideoCapture(str(self._path))
 
@@ -115,7 +120,7 @@ class Pictures:
     rate_hz: float | None = None
 
     def __init__(self, paths: list[Path], loop: bool, still_frames: int) -> None:
-        # A single unreadable file shall be told at the start, not in the middle of a run.
+        # Report an unreadable file at the start, not in the middle of a run.
         for path in paths:
             if not cv2.haveImageReader(str(path)):
                 raise SourceError(f"'{path}' cannot be read as a picture")

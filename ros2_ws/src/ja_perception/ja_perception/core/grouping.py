@@ -14,8 +14,8 @@ from ja_perception.core.features import ColourMap, Mask, without_specks
 from ja_perception.core.hue_families import HUES, ONE_HUE, hue_families
 from ja_perception.core.patches import Patch, hull, patches_of
 
-# Texture is judged in windows, and rims of a mover are joined over gaps, of these fractions of the
-# image's width.
+# Texture is measured in windows, and rims of a mover are joined over gaps, of these fractions of
+# the image's width.
 _TEXTURE_SCALE, _MOVER_SCALE = 16, 40
 # A region that overlaps one of another detector by this share of the smaller is the same object.
 _MERGED_OVERLAP = 0.5
@@ -52,7 +52,7 @@ class Grouping:
         self._config = config
 
     def by_colour(self, colour: ColourMap) -> list[Region]:
-        """Regions of bright colour; touching regions of different hues are separated."""
+        """Return regions of bright colour; touching regions of different hues are separated."""
         bright = without_specks(colour.bright)
         smallest = self._smallest(bright)
         parts = []
@@ -63,7 +63,7 @@ class Grouping:
         return [Region(part.box, part.area) for part in self._without_background(parts, bright)]
 
     def by_texture(self, edges: Mask) -> list[Region]:
-        """Places dense with edges."""
+        """Return the places that are dense with edges."""
         side = texture_window(edges)
         density = cv2.blur(edges * np.uint8(255), (side, side))
         mean, deviation = (float(value[0, 0]) for value in cv2.meanStdDev(density))
@@ -72,7 +72,7 @@ class Grouping:
         return self._whole_patches(cv2.compare(density, least, cv2.CMP_GT))
 
     def by_motion(self, moving: Mask) -> list[Region]:
-        """Regions that move; the rims of one mover are joined."""
+        """Return the regions that move; the rims of one mover are joined."""
         side = max(3, moving.shape[1] // _MOVER_SCALE | 1)
         kernel = np.ones((side, side), np.uint8)
         return self._whole_patches(cv2.morphologyEx(moving, cv2.MORPH_CLOSE, kernel))
@@ -92,12 +92,12 @@ class Grouping:
 
 
 def texture_window(edges: Mask) -> int:
-    """Side of the window in which texture is judged [px]."""
+    """Return the side of the window in which texture is measured [px]."""
     return max(3, edges.shape[1] // _TEXTURE_SCALE | 1)
 
 
 def merged(*sources: list[Region]) -> list[Region]:
-    """Regions of several detectors as one list: what overlaps an earlier one is the same."""
+    """Merge the regions of several detectors: what overlaps an earlier one is the same."""
     regions = [region for source in sources for region in source]
     boxes = np.array([region.box for region in regions], float)
     same = (overlaps(boxes, boxes) >= _MERGED_OVERLAP).tolist()
@@ -109,7 +109,7 @@ def merged(*sources: list[Region]) -> list[Region]:
 
 
 def _parts_by_hue(patch: Patch, hue: NDArray[np.uint8], smallest: int) -> list[Patch]:
-    """A patch's differently coloured parts, or the whole patch where they interleave."""
+    """Return a patch's differently coloured parts, or the whole patch where they interleave."""
     if patch.area < 2 * smallest:
         return [patch]
     least, most, _, _ = cv2.minMaxLoc(hue, patch.mask)
@@ -131,7 +131,7 @@ def _parts_by_hue(patch: Patch, hue: NDArray[np.uint8], smallest: int) -> list[P
 
 
 def _interleave(families: list[list[Patch]]) -> bool:
-    """Do differently coloured parts lie in each other, or alternate as stripes and dots do?"""
+    """Return whether parts of different colours lie in each other or alternate (stripes, dots)."""
     for mine, theirs in combinations(families, 2):
         shared = overlaps([part.box for part in mine], [part.box for part in theirs])
         if (shared > _SEPARATE_OVERLAP).any():

@@ -9,12 +9,12 @@ from ja_perception.core.box import Box
 from ja_perception.core.faces import Face, cut_square
 
 _CASCADE = 'haarcascade_frontalface_default.xml'
-_LOOK_PX = 160
+_CUT_PX = 160
 _LEAST_NEIGHBOURS = 5
 
 
 class HaarFaces:
-    """Needs no network, but loses a face that turns beyond some 20 degrees."""
+    """A finder without a network; it loses a face that turns beyond some 20 degrees."""
 
     smallest_share = 0.2
 
@@ -23,11 +23,11 @@ class HaarFaces:
 
     def find_faces(self, image: NDArray[np.uint8], square: Box) -> list[Face]:
         """See ``FaceFinder.find_faces``. Twenty neighbours or more give a score of 1."""
-        look = cv2.cvtColor(cut_square(image, square, _LOOK_PX), cv2.COLOR_RGB2GRAY)
+        cut = cv2.cvtColor(cut_square(image, square, _CUT_PX), cv2.COLOR_RGB2GRAY)
         boxes, neighbours = self._cascade.detectMultiScale2(
-            look, scaleFactor=1.1, minNeighbors=_LEAST_NEIGHBOURS
+            cut, scaleFactor=1.1, minNeighbors=_LEAST_NEIGHBOURS
         )
-        scale = square.width / _LOOK_PX
+        scale = square.width / _CUT_PX
         faces = []
         for (x, y, w, h), count in zip(boxes, neighbours, strict=True):
             u, v = square.left + scale * (x + w / 2), square.top + scale * (y + h / 2)

@@ -15,7 +15,7 @@ _BLUR, _REACH = 4, 32
 
 
 def _bell() -> NDArray[np.float32]:
-    """Weights of the hues around one, shape (2 * 32 + 1,)."""
+    """Return the weights of the hues around one, shape (2 * 32 + 1,)."""
     weights = np.exp(-0.5 * (np.arange(-_REACH, _REACH + 1) / _BLUR) ** 2)
     return (weights / weights.sum()).astype(np.float32)
 
@@ -24,10 +24,10 @@ _BELL = _bell()
 
 
 def hue_families(histogram: NDArray[np.float32]) -> NDArray[np.uint8] | None:
-    """Family number of each hue, as a table for ``cv2.LUT``; None when all are of one family.
+    """Return the family number of each hue, for ``cv2.LUT``; None when all are of one family.
 
-    ``histogram`` has the number of pixels of each hue, shape (180,). Shape (256,): what lies
-    beyond the hues has no meaning.
+    ``histogram``: number of pixels of each hue, shape (180,). The table has shape (256,); its
+    values beyond the hues have no meaning.
     """
     used = np.flatnonzero(histogram)
     if not used.size:

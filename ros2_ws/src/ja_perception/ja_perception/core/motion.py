@@ -44,7 +44,7 @@ class _Past:
     stamp_ns: int
 
     def apart(self, other: '_Past') -> float:
-        """Angle between the two lines of sight [rad]."""
+        """Return the angle between the two lines of sight [rad]."""
         cosine = float(self.rotation[:, 0] @ other.rotation[:, 0])
         return math.acos(max(-1.0, min(1.0, cosine)))
 
@@ -63,7 +63,7 @@ class MotionDetector:
     def detect_motion(
         self, grey: Mask, stamp_ns: int, camera: CameraModel, posture: Posture | None
     ) -> Mask | None:
-        """Motion map (H, W) of an (H, W) image; None where motion cannot be judged.
+        """Return the motion map (H, W) of an (H, W) image; None where motion cannot be judged.
 
         That is so in the first two images, and while the head turns fast. ``posture`` is the
         head's at the image's stamp; None is a camera that stands still.
@@ -91,7 +91,7 @@ class MotionDetector:
         return cv2.resize(bent(moving, camera), (width, height), interpolation=cv2.INTER_NEAREST)
 
     def _references(self, present: _Past, camera: CameraModel) -> tuple[_Past, _Past] | None:
-        """The oldest image within the span and the view, and one half as old."""
+        """Return the oldest image within the span and the view, and one half as old."""
         past = self._past
         if past and (
             past[-1].grey.shape != present.grey.shape or past[-1].stamp_ns >= present.stamp_ns

@@ -12,10 +12,10 @@ from ja_common.core.posture import NS_PER_S
 
 @dataclass(frozen=True)
 class TrackingConfig(Configuration):
-    """When two sightings are of the same thing, and how firmly a target is held."""
+    """When two detections are of the same object, and how firmly a target is held."""
 
     same_object_within_rad: float = parameter(
-        0.06, 'farthest that an object moves between two sightings', low=0.0, high=1.0
+        0.06, 'farthest that an object moves between two detections', low=0.0, high=1.0
     )
     forget_object_after_s: float = parameter(
         2.0, 'time after which an object not seen again gets a new number', low=0.0, high=60.0
@@ -44,7 +44,7 @@ class ObjectTracker:
         self._target_ns = 0
 
     def update(self, vectors: ArrayLike, stamp_ns: int) -> list[int]:
-        """Track numbers of the objects seen now along base-frame ``vectors``, shape (n, 3)."""
+        """Return the track numbers of the objects seen now along base-frame ``vectors`` (n, 3)."""
         vectors = np.asarray(vectors, float).reshape(-1, 3)
         toward = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
         forget_ns = self._config.forget_object_after_s * NS_PER_S
@@ -63,7 +63,7 @@ class ObjectTracker:
         return ids
 
     def apply_hysteresis(self, ids: list[int], scores: list[float], stamp_ns: int) -> list[float]:
-        """Scores with the hysteresis: the present target's is raised while it stays in view."""
+        """Return the scores, with the present target's raised while it stays in view."""
         raised = [
             score * (1 + self._config.hysteresis * (i == self._target_id))
             for i, score in zip(ids, scores, strict=True)
@@ -76,7 +76,7 @@ class ObjectTracker:
         return raised
 
     def _nearest_first(self, toward: NDArray[np.float64]) -> dict[int, _Track]:
-        """Each object's track: the nearest pairs first, each object and track at most once."""
+        """Return each object's track: the nearest pairs first, each object and track once."""
         if not self._tracks or not len(toward):
             return {}
         cosines = toward @ np.array([track.toward for track in self._tracks]).T

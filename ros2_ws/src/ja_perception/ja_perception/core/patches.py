@@ -28,20 +28,21 @@ class Patch:
 
     @cached_property
     def mask(self) -> Mask:
-        """Its own pixels, (height, width) of 0 and 1."""
+        """Return its own pixels, (height, width) of 0 and 1."""
         return (self.labels == self.label).view(np.uint8)
 
     @property
     def box(self) -> Box:
+        """Return its box [px]."""
         u, v = self.x + (self.width - 1) / 2, self.y + (self.height - 1) / 2
         return Box(u, v, self.width, self.height)
 
     def inside(self, outer: 'Patch') -> 'Patch':
-        """This patch, found in the cut-out of ``outer``, in the coordinates of the whole."""
+        """Return this patch, found in the cut-out of ``outer``, in whole-image coordinates."""
         return replace(self, x=self.x + outer.x, y=self.y + outer.y)
 
     def runs_through(self, image_width: int, image_height: int) -> bool:
-        """Does it run on beyond two opposite borders, about as thick there as elsewhere?"""
+        """Return whether it crosses two opposite borders, about as thick there as elsewhere."""
         return (self.width >= image_width - 2 and _ends_thick(self.mask, self.area)) or (
             self.height >= image_height - 2 and _ends_thick(self.mask.T, self.area)
         )
@@ -53,7 +54,7 @@ def _ends_thick(mask: Mask, area: int) -> bool:
 
 
 def patches_of(mask: Mask, smallest: int, neighbours: int = 4) -> list[Patch]:
-    """The connected patches of a mask (H, W) that have at least ``smallest`` pixels.
+    """Return the connected patches of a mask (H, W) that have at least ``smallest`` pixels.
 
     With 8 ``neighbours`` instead of 4, pixels that touch at a corner are connected.
     """
@@ -72,7 +73,7 @@ def patches_of(mask: Mask, smallest: int, neighbours: int = 4) -> list[Patch]:
 
 
 def hull(patches: list[Patch]) -> Box:
-    """The box around all of several patches."""
+    """Return the box around all of several patches."""
     left, top = min(p.x for p in patches), min(p.y for p in patches)
     right = max(p.x + p.width for p in patches)
     bottom = max(p.y + p.height for p in patches)

@@ -1,4 +1,4 @@
-"""Objects of one image and how interesting each is: Eq. 1 of Nagai, Hosoda and Asada (2003)."""
+"""Objects of one image and their saliency: Eq. 1 of Nagai, Hosoda and Asada (2003)."""
 
 import math
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ class _Maps:
 
 
 class SalientObjects:
-    """Extracts objects by bright colour, texture and motion, and weighs them by Eq. 1."""
+    """Extracts objects by bright colour, texture and motion, and ranks them by Eq. 1."""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class SalientObjects:
         self._tracker = ObjectTracker(tracking)
         self._motion = MotionDetector(motion, features)
         self.motion_judged = False
-        """Was motion told in the last image? See ``MotionDetector.detect_motion``."""
+        """Was motion judged in the last image? See ``MotionDetector.detect_motion``."""
         self.moving_share = 0.0
         """Share of the last image that moved."""
 
@@ -79,7 +79,7 @@ class SalientObjects:
         posture: Posture | None,
         heads: list[Box],
     ) -> list[Detection]:
-        """Objects in an (H, W, 3) uint8 RGB image, most salient first, with the features of Eq. 1.
+        """Return the objects in an (H, W, 3) uint8 RGB image, most salient first (Eq. 1).
 
         ``f_col``: area A of its bright colour, ``f_mot``: area A in motion, both as A / (A + G),
         where G is the area within d_th of the centre. ``f_edg``: share of edge pixels in its box.
@@ -150,7 +150,7 @@ class SalientObjects:
 def _features(
     boxes: NDArray[np.float64], bright_px: NDArray[np.float64], maps: _Maps, camera: CameraModel
 ) -> NDArray[np.float64]:
-    """f_col, f_edg and f_mot, shape (n, 3), of boxes (n, 4) with so many bright pixels (n,)."""
+    """Return f_col, f_edg and f_mot, shape (n, 3), of boxes (n, 4) with ``bright_px`` (n,)."""
     height, width = maps.edges.shape
     # Of a coarser map the last row may reach a pixel beyond the image.
     edges = np.minimum(np.rint(corners(boxes) + 0.5), (width, height, width, height))
@@ -187,7 +187,7 @@ def _blank(feature: Mask, box: Box) -> None:
 
 
 def _amounts(feature: Mask, edges: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Sum of a feature in each box, shape (n,), of edges (left, top, right, bottom), (4, n)."""
+    """Return the sum of a feature in each box (n,), of edges left, top, right, bottom (4, n)."""
     sums = cv2.integral(feature)
     left, top, right, bottom = edges
     return sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]

@@ -12,14 +12,14 @@ Maps = tuple[NDArray, NDArray]
 
 
 def straightened(image: NDArray[np.uint8], camera: CameraModel) -> NDArray[np.uint8]:
-    """An (H, W) image with the lens distortion of ``camera`` taken out."""
+    """Return an (H, W) image without the lens distortion of ``camera``."""
     if not camera.distortion:
         return image
     return cv2.remap(image, *_straight_from_bent(camera), cv2.INTER_LINEAR)
 
 
 def bent(mask: NDArray[np.uint8], camera: CameraModel) -> NDArray[np.uint8]:
-    """An (H, W) mask of the straightened image, in pixels of the original."""
+    """Return an (H, W) mask of the straightened image in pixels of the original."""
     if not camera.distortion:
         return mask
     return cv2.remap(mask, *_bent_from_straight(camera), cv2.INTER_NEAREST)

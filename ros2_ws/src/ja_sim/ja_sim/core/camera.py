@@ -1,4 +1,4 @@
-"""The camera on the head: its intrinsics, and what exposure does to a picture."""
+"""The camera on the head: its intrinsics, and the effects of exposure on a picture."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Intrinsics:
 
     @classmethod
     def of_view(cls, spec: HeadSpec, image_size: tuple[int, int]) -> Intrinsics:
-        """The camera whose picture of (width, height) [px] spans exactly the head's view."""
+        """Return the camera whose picture of (width, height) [px] spans the head's view."""
         width, height = image_size
         return cls(
             width,
@@ -46,22 +46,22 @@ class Observation:
 
     @property
     def fx(self) -> float:
-        """Horizontal focal length [px]."""
+        """Return the horizontal focal length [px]."""
         return self.intrinsics.fx
 
     @property
     def fy(self) -> float:
-        """Vertical focal length [px]."""
+        """Return the vertical focal length [px]."""
         return self.intrinsics.fy
 
     @property
     def cx(self) -> float:
-        """Column of the optical axis [px]."""
+        """Return the column of the optical axis [px]."""
         return self.intrinsics.cx
 
     @property
     def cy(self) -> float:
-        """Row of the optical axis [px]."""
+        """Return the row of the optical axis [px]."""
         return self.intrinsics.cy
 
 
@@ -72,7 +72,7 @@ def expose(
     spec: HeadSpec,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """What the sensor makes of a sharp picture while the head turns at ``velocity`` [rad/s].
+    """Return a sharp picture as exposed while the head turns at ``velocity`` (2,) [rad/s].
 
     A turning camera smears the whole picture alike, so that motion blur is one line-shaped filter.
     """
@@ -88,7 +88,7 @@ def expose(
 
 
 def _line_kernel(smear: np.ndarray) -> np.ndarray:
-    """A filter that averages along (du, dv) [px], centred."""
+    """Return a filter that averages along (du, dv) [px], centred."""
     half = math.ceil(float(np.max(np.abs(smear))) / 2.0)
     kernel = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
     steps = np.round(np.linspace(-0.5, 0.5, 4 * half + 1)[:, None] * smear).astype(int) + half

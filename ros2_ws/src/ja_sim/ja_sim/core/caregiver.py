@@ -1,6 +1,6 @@
-"""The caregiver's body in the scene: who she is, and how head, eyes and lids stand.
+"""The caregiver's body in the scene: her appearance, and the posture of head, eyes and lids.
 
-The meshes come from MakeHuman; ``assets/ORIGIN.md`` says how.
+The meshes come from MakeHuman; ``assets/ORIGIN.md`` describes how.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _LID = {'pos': (0.0, 0.0, 0.0), 'size': (1.07, 1.07, 1.07)}
 
 @dataclass(frozen=True)
 class Appearance:
-    """Who she is today; colours are RGB in 0..1."""
+    """Who she is in one run; colours are RGB in 0..1."""
 
     identity: str
     skin: tuple[float, float, float]
@@ -55,7 +55,7 @@ class Appearance:
 
 
 def identities() -> list[str]:
-    """Names of the people in the asset."""
+    """Return the names of the people in the asset."""
     return [str(name) for name in _asset()['identities']]
 
 
@@ -100,7 +100,7 @@ class CaregiverBodies:
             eye = spec.worldbody.add_body(name=f'{side}_eye', mocap=True)
             lid = spec.worldbody.add_body(name=f'{side}_lid', mocap=True)
             for body, part in ((eye, 'white'), (eye, 'iris'), (eye, 'pupil'), (lid, 'lid')):
-                # Any size will do until somebody is there to measure.
+                # A placeholder size, until a person is drawn.
                 body.add_geom(
                     name=f'{side}_{part}',
                     type=_ELLIPSOID,
@@ -108,8 +108,8 @@ class CaregiverBodies:
                     material='skin' if part == 'lid' else 'eye',
                 )
 
-    def bind(self, model: mujoco.MjModel) -> None:
-        """Look up what moves."""
+    def bind_model(self, model: mujoco.MjModel) -> None:
+        """Look up the ids of what moves in the compiled model."""
         self._model = model
         names = ['caregiver_torso', 'caregiver_head']
         names += [f'{side}_{part}' for part in ('eye', 'lid') for side in SIDES]
@@ -121,30 +121,35 @@ class CaregiverBodies:
         parts += [self._arm, self._hand]
         model.geom_sameframe[parts] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
 
-    def dress(self, look: Appearance) -> None:
-        """Become somebody: meshes, eyes and colours; nothing is recompiled."""
+    def apply_appearance(self, appearance: Appearance) -> None:
+        """Show a person: meshes, eyes and colours; nothing is recompiled."""
         asset, model = _asset(), self._model
-        self.eyes = asset[f'{look.identity}.eyes'].astype(float)
-        self.face = asset[f'{look.identity}.face'].astype(float)
+        self.eyes = asset[f'{appearance.identity}.eyes'].astype(float)
+        self.face = asset[f'{appearance.identity}.face'].astype(float)
         self.origin = self._face_at - self._facing @ self.face
         for name in identities():
-            shown = _SHOWN if name == look.identity else _HIDDEN
+            shown = _SHOWN if name == appearance.identity else _HIDDEN
             for part in ('head', 'hair', 'shirt'):
                 model.geom_group[model.geom(f'{name}_{part}').id] = shown
         for part in ('hair', 'shirt'):
-            model.geom_rgba[model.geom(f'{look.identity}_{part}').id, :3] = getattr(look, part)
-        model.geom_rgba[model.geom(f'{look.identity}_head').id, :3] = look.skin
-        model.geom_rgba[self._arm, :3], model.geom_rgba[self._hand, :3] = look.shirt, look.skin
-        radius = float(asset[f'{look.identity}.eye_radius'])
+            model.geom_rgba[model.geom(f'{appearance.identity}_{part}').id, :3] = getattr(
+                appearance, part
+            )
+        model.geom_rgba[model.geom(f'{appearance.identity}_head').id, :3] = appearance.skin
+        model.geom_rgba[self._arm, :3], model.geom_rgba[self._hand, :3] = (
+            appearance.shirt,
+            appearance.skin,
+        )
+        radius = float(asset[f'{appearance.identity}.eye_radius'])
         for side in SIDES:
-            self._dress_eye(side, radius, look)
+            self._apply_eye_appearance(side, radius, appearance)
 
-    def _dress_eye(self, side: str, radius: float, look: Appearance) -> None:
-        lid_skin = tuple(0.85 * value for value in look.skin)
+    def _apply_eye_appearance(self, side: str, radius: float, appearance: Appearance) -> None:
+        lid_skin = tuple(0.85 * value for value in appearance.skin)
         white = {'pos': (0.0, 0.0, 0.0), 'size': (1.0, 1.0, 1.0)}
         parts: dict[str, tuple[dict[str, Any], tuple[float, ...]]] = {
             'white': (white, (0.86, 0.85, 0.83)),
-            'iris': (_IRIS, look.iris),
+            'iris': (_IRIS, appearance.iris),
             'pupil': (_PUPIL, (0.03, 0.03, 0.03)),
             'lid': (_LID, lid_skin),
         }
@@ -155,11 +160,11 @@ class CaregiverBodies:
             self._model.geom_rgba[geom, :3] = colour
 
     def to_rest_frame(self, point: np.ndarray) -> np.ndarray:
-        """A point (3,) of the base frame in her rest frame [m]."""
+        """Return a point (3,) of the base frame in her rest frame [m]."""
         return (point - self.origin) @ self._facing
 
     def face_position(self, pose: GazePose) -> np.ndarray:
-        """Centre of her face (3,) [m] in the base frame, in a posture."""
+        """Return the centre of her face (3,) [m] in the base frame, in a posture."""
         return self.origin + self._facing @ head_rotation(pose.head) @ self.face
 
     def place(self, data: mujoco.MjData, pose: GazePose, eyes_closed: bool) -> None:
@@ -173,7 +178,7 @@ class CaregiverBodies:
             mujoco.mju_mat2Quat(data.mocap_quat[mocap], rotation.ravel())
         self._model.geom_group[self._lids] = _SHOWN if eyes_closed else _HIDDEN
 
-    def reach(self, data: mujoco.MjData, hand: np.ndarray | None) -> None:
+    def place_arm(self, data: mujoco.MjData, hand: np.ndarray | None) -> None:
         """Stretch the nearer arm out to a point (3,) [m]; None hides it: both arms hang."""
         model = self._model
         model.geom_group[[self._arm, self._hand]] = _HIDDEN if hand is None else _SHOWN
@@ -190,7 +195,7 @@ class CaregiverBodies:
 
 
 def _add_skin(spec: mujoco.MjSpec) -> None:
-    """The painted skin, and materials that take their colour from each geom."""
+    """Add the painted skin, and materials that take their colour from each geom."""
     picture = resources.files('ja_sim') / 'assets' / _SKIN_FILE
     spec.assets = {**spec.assets, _SKIN_FILE: picture.read_bytes()}
     spec.add_texture(name='skin', type=mujoco.mjtTexture.mjTEXTURE_2D, file=_SKIN_FILE)

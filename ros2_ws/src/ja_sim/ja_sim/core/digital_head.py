@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ja_common.core.config import Configuration, parameter
-from ja_common.core.geometry import head_rotation
+from ja_common.core.geometry import finite_pair, head_rotation
 from ja_common.core.posture import NS_PER_S, Posture
 
 # From the optical frame (x right, y down, z forward) to the head frame (x forward, y left, z up).
@@ -50,27 +50,24 @@ class DigitalHead:
 
     @property
     def focal_px(self) -> float:
-        """Focal length of the window [px]; its optical axis goes through its centre."""
+        """Return the focal length of the window [px]; its optical axis goes through its centre."""
         return self._config.view_width_px / 2 / math.tan(self._config.view_rad / 2)
 
     def limits(self, wide_width_px: int, wide_height_px: int) -> NDArray[np.float64]:
-        """Greatest pan and tilt, (2,) [rad]: all of the wide picture can be centred."""
+        """Return the greatest pan and tilt, (2,) [rad]: all of the wide picture can be centred."""
         half_width = math.tan(self._config.wide_view_rad / 2)
         return np.arctan([half_width, half_width * wide_height_px / wide_width_px])
 
     def command(self, posture: ArrayLike) -> None:
-        """Give the servos a target (pan, tilt) [rad]; ValueError unless two finite numbers."""
-        target = np.array(posture, float)
-        if target.shape != (2,) or not np.all(np.isfinite(target)):
-            raise ValueError(f'a posture is two finite numbers (pan, tilt), not {posture!r}')
-        self._target = target
+        """Set the servos' target (pan, tilt) [rad]. ValueError unless two finite numbers."""
+        self._target = finite_pair('a commanded posture', posture)
 
     def render_view(
         self, wide: NDArray[np.uint8], stamp_ns: int
     ) -> tuple[NDArray[np.uint8], Posture]:
-        """Let the servos run until ``stamp_ns``; the window's picture and the posture there.
+        """Run the servos until ``stamp_ns``; return the window's picture and the posture there.
 
-        ``wide``: (H, W, 3) or (H, W) uint8. What lies beyond the wide picture is black.
+        ``wide``: (H, W, 3) or (H, W) uint8. Beyond the wide picture the view is black.
         """
         height, width = wide.shape[:2]
         limits = self.limits(width, height)
@@ -81,7 +78,7 @@ class DigitalHead:
         return self._view(wide), posture
 
     def _run_servos(self, target: NDArray[np.float64], elapsed_s: float) -> None:
-        """Full speed towards the target, then an exponential rest: exact for any ``elapsed_s``."""
+        """Run at full speed, then approach exponentially: exact for any ``elapsed_s``."""
         tau = self._config.time_constant_s
         gap = target - self._position
         # Within this distance the servo no longer needs its full speed.

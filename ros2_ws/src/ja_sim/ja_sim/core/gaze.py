@@ -30,8 +30,8 @@ class GazePose:
     eyes: np.ndarray
 
 
-def missed(target: np.ndarray, eyes: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """The point (3,) beside ``target`` at which eyes look that miss it by ``error`` (2,) [rad]."""
+def missed_point(target: np.ndarray, eyes: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Return the point (3,) at which eyes look that miss ``target`` by ``error`` (2,) [rad]."""
     centre = eyes.mean(axis=0)
     line = target - centre
     landed = vectors_of_directions(directions_of_vectors(line) + error)
@@ -39,7 +39,7 @@ def missed(target: np.ndarray, eyes: np.ndarray, error: np.ndarray) -> np.ndarra
 
 
 def head_angles(target: np.ndarray, eyes: np.ndarray, share: float) -> np.ndarray:
-    """Head yaw and pitch (2,) [rad] when it takes ``share`` of the angle from eyes to target.
+    """Return head yaw and pitch (2,) [rad] for ``share`` of the angle from eyes to target.
 
     ``target`` (3,) and ``eyes`` (2, 3), left and right at rest, are in the rest frame [m].
     """
@@ -48,20 +48,23 @@ def head_angles(target: np.ndarray, eyes: np.ndarray, share: float) -> np.ndarra
 
 
 def eye_angles(target: np.ndarray, eyes: np.ndarray, head: np.ndarray) -> np.ndarray:
-    """Yaw and pitch (2, 2) [rad] in the head at which each eye points at the target, if it can."""
+    """Return yaw and pitch (2, 2) [rad] in the head at which each eye points at the target.
+
+    Clipped to the range of the eyes.
+    """
     rotation = head_rotation(head)
     in_head = target @ rotation - eyes
     return np.clip(directions_of_vectors(in_head), -EYE_RANGE_RAD, EYE_RANGE_RAD)
 
 
 def minimum_jerk(phase: float) -> float:
-    """Smooth progress from 0 to 1 as ``phase`` goes from 0 to 1 (Flash and Hogan 1985)."""
+    """Return smooth progress from 0 to 1 as ``phase`` goes from 0 to 1 (Flash and Hogan 1985)."""
     phase = min(max(phase, 0.0), 1.0)
     return phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
 
 
 class GazeShift:
-    """Turns from wherever the head is to a target; eyes lead and stay on it while the head turns.
+    """Turns from the present posture to a target; eyes lead and stay on it while the head turns.
 
     All points in the rest frame [m], all times in seconds.
     """
@@ -82,7 +85,7 @@ class GazeShift:
         self._start_s, self._turn_s = at_s, turn_s
 
     def pose(self, now_s: float, target: np.ndarray | None = None) -> GazePose:
-        """The posture now; ``target`` moves the point that the eyes follow."""
+        """Return the posture at ``now_s``; ``target`` moves the point that the eyes follow."""
         head = self._head(now_s)
         if now_s < self._start_s:
             point = self._old_target

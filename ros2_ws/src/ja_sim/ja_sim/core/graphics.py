@@ -1,4 +1,4 @@
-"""Which OpenGL draws: found out before MuJoCo is imported, which loads what MUJOCO_GL names.
+"""Which OpenGL draws: chosen before MuJoCo is imported, which loads what MUJOCO_GL names.
 
 EGL with Mesa's software rasteriser needs neither display nor GPU; OSMesa is the fallback.
 """
@@ -22,11 +22,11 @@ class RenderError(RuntimeError):
 def require_named_backend() -> None:
     """Raise RenderError if MUJOCO_GL names a missing library: MuJoCo cannot be imported then."""
     if os.environ.get('MUJOCO_GL', '').lower() in LIBRARIES:
-        backend()
+        choose_backend()
 
 
-def backend() -> str:
-    """The backend to draw with: what MUJOCO_GL names, or else the first that is installed."""
+def choose_backend() -> str:
+    """Return the backend that MUJOCO_GL names, or else the first that is installed."""
     wanted = os.environ.get('MUJOCO_GL', '').lower()
     if wanted and wanted not in LIBRARIES:
         raise RenderError(f"MUJOCO_GL={wanted}: the world renders with 'egl' or 'osmesa'")

@@ -50,7 +50,7 @@ class PanTiltHead:
         mujoco.mj_resetData(self._model, self._data)
 
     def command(self, posture: np.ndarray) -> bool:
-        """Give a target posture (2,) [rad]; True if it had to be clamped to the limits."""
+        """Set a target posture (2,) [rad]; return True if it had to be clamped to the limits."""
         target = np.clip(posture, self.limits[:, 0], self.limits[:, 1])
         self._data.ctrl[:] = target
         return bool(np.any(target != posture))
@@ -65,21 +65,21 @@ class PanTiltHead:
 
     @property
     def time_s(self) -> float:
-        """Time since the reset [s]."""
+        """Return the time since the reset [s]."""
         return float(self._data.time)
 
     @property
     def posture(self) -> np.ndarray:
-        """Where the camera truly points, (2,) [rad]."""
+        """Return where the camera truly points, (2,) [rad]."""
         return self._data.qpos[self._load].copy()
 
     @property
     def velocity(self) -> np.ndarray:
-        """How fast the camera truly turns, (2,) [rad/s]."""
+        """Return how fast the camera truly turns, (2,) [rad/s]."""
         return self._data.qvel[self._load].copy()
 
     def read_encoders(self, stamp_ns: int, rng: np.random.Generator) -> JointSample:
-        """Position and velocity as the encoders tell them: delayed, noisy and in steps."""
+        """Return position and velocity as the encoders measure them: delayed, noisy, in steps."""
         position, velocity = self._data.sensordata.reshape(2, 2).T
         noise, step = (
             math.radians(self.spec.encoder_noise_deg),
@@ -125,7 +125,7 @@ def _turning_body(
 
 
 def _add_servo(model: mujoco.MjSpec, joint: mujoco.MjsJoint, spec: HeadSpec) -> None:
-    """A critically damped position servo on a motor whose torque falls with speed."""
+    """Add a critically damped position servo on a motor whose torque falls with speed."""
     stiffness, damping = spec.servo_frequency_rad_s**2, 2.0 * spec.servo_frequency_rad_s
     servo = model.add_actuator(
         name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT

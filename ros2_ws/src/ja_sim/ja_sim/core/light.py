@@ -1,4 +1,4 @@
-"""The light in the room, drawn anew at each reset."""
+"""The light in the room, drawn at random at each reset."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MAX_DIMMING = 0.35
 
 
 class Lighting:
-    """Varies every lamp's strength and direction around what the room's file says."""
+    """Varies every lamp's strength and direction around those of the room's file."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = model
@@ -20,7 +20,7 @@ class Lighting:
         self._direction = model.light_dir.copy()
         self._ambient = model.vis.headlight.ambient.copy()
 
-    def vary(self, amount: float, rng: np.random.Generator) -> None:
+    def randomise(self, amount: float, rng: np.random.Generator) -> None:
         """Draw a lighting; ``amount`` from 0 (as in the file) to 1 (as different as it gets)."""
         model = self._model
         for lamp in range(model.nlight):

@@ -18,11 +18,11 @@ PATTERNS = ('plain', 'checker', 'dots', 'cross')
 MOTION_RADIUS_M = 0.015
 MOTION_RATE_HZ = 0.8
 CEILING_HEIGHT_M = 1.5
-_ARRANGEMENTS, _PLACES = 20, 400  # tried before the scene is called too full
+_ARRANGEMENTS, _PLACES = 20, 400  # tries before an error
 
 
 @dataclass(frozen=True)
-class Thing:
+class SceneObject:
     """One object: ``position`` is its centre at rest, (3,) [m] in the base frame."""
 
     identifier: int
@@ -36,7 +36,7 @@ class Thing:
     phase_rad: float
 
     def position_at(self, time_s: float, shaken: bool = False) -> np.ndarray:
-        """Where it is at a time: moving objects circle upright, a shaken one does so faster."""
+        """Return its centre (3,) [m] at a time; if moving it circles upright, shaken faster."""
         if not (self.moving or shaken):
             return self.position
         angle = 2.0 * math.pi * MOTION_RATE_HZ * (3.0 if shaken else 1.0) * time_s + self.phase_rad
@@ -48,30 +48,30 @@ class Arrangement:
     """Draws objects and keeps them until they are rearranged."""
 
     def __init__(self, spec: ObjectsSpec, face: np.ndarray, rng: np.random.Generator) -> None:
-        """``face`` (3,) [m]: no object may hide it."""
+        """Draw the first arrangement. ``face`` (3,) [m]: no object may hide it."""
         self._spec, self._face, self._rng = spec, face, rng
         self._next_identifier = 0
-        self.things = self._new_things(self._draw_positions())
+        self.objects = self._new_objects(self._draw_positions())
 
     def rearrange(self) -> None:
-        """Change the scene as the specification says: not at all, the places, or all objects."""
+        """Change what the specification names: nothing, the places, or all objects."""
         if self._spec.rearranged == 'never':
             return
         positions = self._draw_positions()
         if self._spec.rearranged == 'replaced':
-            self.things = self._new_things(positions)
+            self.objects = self._new_objects(positions)
         else:
-            pairs = zip(self.things, positions, strict=True)
-            self.things = [replace(thing, position=position) for thing, position in pairs]
+            pairs = zip(self.objects, positions, strict=True)
+            self.objects = [replace(each, position=position) for each, position in pairs]
 
     def draw_place(self) -> np.ndarray:
-        """Any point (3,) [m] of the space that objects may be in."""
+        """Return a random point (3,) [m] of the space that objects may be in."""
         spec, rng = self._spec, self._rng
         direction = np.radians([rng.uniform(*spec.pan_deg), rng.uniform(*spec.tilt_deg)])
         return rng.uniform(*spec.distance_m) * vectors_of_directions(direction)
 
     def _draw_positions(self) -> list[np.ndarray]:
-        """Draw one after the other, each clear of the face and of those before it."""
+        """Draw one position after the other, each clear of the face and of those before it."""
         spec = self._spec
         nearest_to_face = math.cos(math.radians(spec.gap_to_face_deg))
         nearest = math.cos(math.radians(spec.gap_deg))
@@ -93,15 +93,15 @@ class Arrangement:
             'widen pan_deg and tilt_deg, or lower count or gap_deg'
         )
 
-    def _new_things(self, positions: list[np.ndarray]) -> list[Thing]:
+    def _new_objects(self, positions: list[np.ndarray]) -> list[SceneObject]:
         spec, rng = self._spec, self._rng
         # Hues all around the circle, so that no two objects of a scene look alike.
         hues = (rng.random() + rng.permutation(spec.count) / spec.count) % 1.0
-        things = []
+        objects = []
         for position, hue in zip(positions, hues, strict=True):
             axis = rng.normal(size=4)
-            things.append(
-                Thing(
+            objects.append(
+                SceneObject(
                     identifier=self._next_identifier,
                     position=position,
                     radius_m=float(rng.uniform(*spec.radius_m)),
@@ -116,7 +116,7 @@ class Arrangement:
                 )
             )
             self._next_identifier += 1
-        return things
+        return objects
 
 
 _GEOMS = {
@@ -143,8 +143,8 @@ class ObjectBodies:
             )
         self._count = count
 
-    def bind(self, model: mujoco.MjModel, table_height_m: float) -> None:
-        """Look up everything that changes; ``table_height_m`` is where the stands stand."""
+    def bind_model(self, model: mujoco.MjModel, table_height_m: float) -> None:
+        """Look up the ids of what changes; ``table_height_m`` is where the stands begin."""
         self._model, self._table_height = model, table_height_m
         self._geom = [model.geom(f'object_{i}').id for i in range(self._count)]
         self._stand = [model.geom(f'stand_{i}').id for i in range(self._count)]
@@ -153,18 +153,18 @@ class ObjectBodies:
         self._mocap = [model.body(f'object_{i}').mocapid[0] for i in range(self._count)]
         self._material = {p: model.material(f'object_{p}').id for p in PATTERNS}
 
-    def dress(self, things: list[Thing]) -> None:
-        """Give the bodies the shapes, sizes, colours and patterns of these things."""
+    def apply_appearance(self, objects: list[SceneObject]) -> None:
+        """Give the bodies the shapes, sizes, colours and patterns of these objects."""
         model = self._model
-        for thing, geom, stand in zip(things, self._geom, self._stand, strict=True):
-            kind, size = _GEOMS[thing.shape]
+        for each, geom, stand in zip(objects, self._geom, self._stand, strict=True):
+            kind, size = _GEOMS[each.shape]
             model.geom_type[geom] = kind
-            model.geom_size[geom] = thing.radius_m * np.array(size)
-            model.geom_rgba[geom] = (*thing.colour, 1.0)
-            model.geom_matid[geom] = self._material[thing.pattern]
-            model.geom_quat[geom] = thing.quaternion
-            # Low things stand on the table, high ones hang, so that no rod crosses her face.
-            height = float(thing.position[2])
+            model.geom_size[geom] = each.radius_m * np.array(size)
+            model.geom_rgba[geom] = (*each.colour, 1.0)
+            model.geom_matid[geom] = self._material[each.pattern]
+            model.geom_quat[geom] = each.quaternion
+            # Low objects stand on the table, high ones hang, so that no rod crosses her face.
+            height = float(each.position[2])
             end = self._table_height if height < 0.0 else CEILING_HEIGHT_M
             model.geom_size[stand, 1] = abs(end - height) / 2.0
             model.geom_pos[stand, 2] = (end - height) / 2.0

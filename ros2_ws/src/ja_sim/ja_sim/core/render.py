@@ -12,28 +12,28 @@ import cv2
 import mujoco
 import numpy as np
 
-from ja_sim.core.graphics import ADVICE, RenderError, backend
+from ja_sim.core.graphics import ADVICE, RenderError, choose_backend
 
-# Drawn larger by this and reduced. Measured (docs/world.md): the rasteriser's own multisampling
-# costs twice as much for the same edges.
+# Drawn larger by this factor and reduced. Measured (docs/world.md): the rasteriser's own
+# multisampling costs twice as much for the same edges.
 SUPERSAMPLING = 1.5
 
 
 def _make_context(width: int, height: int) -> Any:
-    # Mesa's software rasteriser would start a thread a core, for which every picture then waits:
-    # on two busy cores 9.2 ms, where the drawing itself takes 5.1.
+    # Mesa's software rasteriser would start a thread per core, and every picture waits for all
+    # of them: 9.2 ms on two busy cores, where the drawing itself takes 5.1 ms.
     os.environ.setdefault('LP_NUM_THREADS', '0')
-    name = backend()
+    name = choose_backend()
     try:
         context = importlib.import_module(f'mujoco.{name}').GLContext(width, height)
         context.make_current()
-    except Exception as error:  # the bindings raise whatever the driver gives them
-        raise RenderError(f'{ADVICE}; {name} said: {error}') from error
+    except Exception as error:  # the bindings raise what the driver returns
+        raise RenderError(f'{ADVICE}; {name}: {error}') from error
     return context
 
 
 def buffer_size(image_size: tuple[int, int]) -> tuple[int, int]:
-    """Width and height [px] of what is drawn for a picture of ``image_size``."""
+    """Return the width and height [px] of what is drawn for a picture of ``image_size``."""
     width, height = image_size
     return round(SUPERSAMPLING * width), round(SUPERSAMPLING * height)
 
@@ -47,7 +47,7 @@ class Renderer:
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, camera: str, image_size: tuple[int, int]
     ) -> None:
-        """``image_size`` is (width, height) [px]. Raises RenderError if nothing can be drawn."""
+        """Open a context; ``image_size``: (width, height) [px]. RenderError without OpenGL."""
         width, height = buffer_size(image_size)
         self._image_size = image_size
         self._model, self._data = model, data
@@ -56,8 +56,8 @@ class Renderer:
         self._gl = _make_context(width, height)
         self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50)
         self._free = weakref.finalize(self, _free, self._context, self._gl)
-        # At exit before MuJoCo's bindings shut OpenGL down, as only what was registered after them
-        # is; finalizers of their own accord run when the first of any library was registered.
+        # At exit this must run before MuJoCo's bindings shut OpenGL down, so it is registered
+        # after them; a finalizer's own exit hook would run as late as the first one registered.
         self._free.atexit = False
         atexit.register(self._free)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
@@ -72,10 +72,10 @@ class Renderer:
             raise RenderError(f'{ADVICE}; the driver that is there draws empty images')
 
     def draw(self) -> np.ndarray:
-        """Draw the scene as it stands (kinematics must be current)."""
+        """Draw the scene, (H, W, 3) uint8 RGB; its kinematics must be current."""
         self._gl.make_current()
         model, data, options, scene = self._model, self._data, self._options, self._scene
-        # The room last: what stands before it hides much of it, and what is hidden costs nothing.
+        # The room last: the objects hide much of it, and what is hidden costs nothing.
         moving, fixed = mujoco.mjtCatBit.mjCAT_DYNAMIC, mujoco.mjtCatBit.mjCAT_STATIC
         mujoco.mjv_updateScene(model, data, options, None, self._camera, moving, scene)
         mujoco.mjv_addGeoms(model, data, options, self._no_perturbation, fixed, scene)
@@ -85,7 +85,7 @@ class Renderer:
         return cv2.resize(upright, self._image_size, interpolation=cv2.INTER_AREA)
 
     def close(self) -> None:
-        """Give the graphics memory back."""
+        """Free the graphics memory."""
         self._free()
         atexit.unregister(self._free)
 
@@ -93,9 +93,9 @@ class Renderer:
 def _free(context: mujoco.MjrContext, gl: Any) -> None:
     try:
         gl.make_current()
-    except Exception:  # the bindings raise whatever the driver gives them
-        pass  # the thread that drew has it still: the memory goes with the process
+    except Exception:  # the bindings raise what the driver returns
+        pass  # another thread holds it: the memory is freed with the process
     else:
         context.free()
-    # In any case now: the bindings would free it again, and complain, once EGL is shut down.
+    # Always free it here: the bindings would try again, and log an error, after EGL shuts down.
     gl.free()

@@ -26,14 +26,14 @@ from ja_sim.core.specs import (
 
 
 class SceneError(ConfigError):
-    """A scene that cannot be built; the message says where, what and what to write instead."""
+    """A scene that cannot be built; the message names the place, the mistake and its fix."""
 
 
 @dataclass(frozen=True)
 class Scene(Configuration):
     """A whole world, ready for :class:`ja_sim.core.world.JointAttentionWorld`."""
 
-    name: str = parameter('default', 'What reports call it')
+    name: str = parameter('default', 'Its name in reports')
     head: HeadSpec = field(default_factory=HeadSpec)
     caregiver: CaregiverSpec = field(default_factory=CaregiverSpec)
     objects: ObjectsSpec = field(default_factory=ObjectsSpec)
@@ -41,7 +41,7 @@ class Scene(Configuration):
 
 
 def scene_names() -> list[str]:
-    """Names of the scenes shipped with the package."""
+    """Return the names of the scenes shipped with the package."""
     folder = resources.files('ja_sim') / 'scenes'
     return sorted(Path(f.name).stem for f in folder.iterdir() if f.name.endswith('.yaml'))
 

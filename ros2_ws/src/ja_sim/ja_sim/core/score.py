@@ -1,6 +1,6 @@
-"""The score of joint attention: did the robot fixate the object that the caregiver meant?
+"""The score of joint attention: did the robot fixate the object that the caregiver attends to?
 
-Only here and in the simulator is that known; the robot's own nodes never hear of it.
+Only this module and the simulator know it; the robot's own nodes never subscribe to it.
 """
 
 from collections import deque
@@ -15,7 +15,7 @@ from ja_common.core.statistics import Rate
 
 @dataclass(frozen=True)
 class TrialOutcome:
-    """How one trial ended. Directions are (pan, tilt) [rad]; no fixation means it was given up."""
+    """How one trial ended. Directions are (pan, tilt) [rad]; no fixation: it was given up."""
 
     trial: int
     stamp_ns: int
@@ -30,7 +30,7 @@ class TrialOutcome:
 class TruthAt:
     """The truth at one image: which trial it is and where the objects are.
 
-    `directions`: (n, 2) [rad] of the objects; `attended`: index of the one she means (-1: none);
+    `directions`: (n, 2) [rad] of the objects; `attended`: index of the attended object (-1: none);
     `in_view`: was it in the robot's view when the robot looked at her?
     """
 
@@ -46,18 +46,20 @@ class Score:
 
     def __init__(self, window: int = 100) -> None:
         self._truth: TruthAt | None = None
-        self._is_whole = False  # the trial under way was seen from its beginning
+        self._is_whole = False  # the present trial was observed from its beginning
         self._fixated: tuple[float, float] | None = None
         self._success = False
         self._recent: deque[bool] = deque(maxlen=window)
         self._rates: dict[str, Rate] = {}
 
-    def see(self, truth: TruthAt, fixation: NDArray[np.float64] | None) -> TrialOutcome | None:
-        """One image: the truth and the fixation (2,) [rad] at its stamp; what just ended, if any.
+    def score_image(
+        self, truth: TruthAt, fixation: NDArray[np.float64] | None
+    ) -> TrialOutcome | None:
+        """Score one image: truth and fixation (2,) [rad] at its stamp; return an ended trial.
 
-        A trial ends when the next begins. What happens before the first look (trial 0) belongs to
-        none. A trial that a reset of the world cuts off, or of which only a part was seen, does
-        not count.
+        None is returned while the trial goes on. A trial ends when the next begins. Images before
+        the first look (trial 0) belong to none. A trial that a reset of the world cuts off, or
+        that was not observed from its beginning, does not count.
         """
         ended = None
         if self._truth is not None and truth.trial != self._truth.trial:
@@ -72,7 +74,7 @@ class Score:
         return ended
 
     def rates(self) -> dict[str, Rate]:
-        """Rates by name: 'all', 'recent', 'in_view', 'out_of_view', and 'objects_N'."""
+        """Return rates by name: 'all', 'recent', 'in_view', 'out_of_view', and 'objects_N'."""
         return {'recent': Rate(sum(self._recent), len(self._recent)), **self._rates}
 
     def _close(self, truth: TruthAt) -> TrialOutcome:

@@ -1,7 +1,7 @@
-"""What a world is made of: frozen, validated descriptions of head, caregiver, objects and room.
+"""The parts of a world: frozen, validated descriptions of head, caregiver, objects and room.
 
 The defaults are the geometry in which all figures are measured. Angles are in degrees here because
-people write them; everything computed from them is in radians.
+people write them; the code computes in radians.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ class CaregiverSpec(Configuration):
 
 @dataclass(frozen=True)
 class ObjectsSpec(Configuration):
-    """The things on and above the table, seen from the robot's head."""
+    """The objects on and above the table, relative to the robot's head."""
 
     count: int = parameter(5, 'How many', low=1, high=10)
     pan_deg: tuple[float, float] = interval_parameter(

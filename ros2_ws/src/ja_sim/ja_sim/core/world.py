@@ -1,7 +1,7 @@
 """The simulated world as a class: reset, command, step, observe. No ROS.
 
-The robot's side is what a rig would give: pictures and encoder readings. ``truth()`` is for the
-scorer alone; nothing that learns may call it.
+The robot gets what a rig would provide: pictures and encoder readings. ``truth()`` is for the
+scorer alone; a learner must not call it.
 """
 
 from __future__ import annotations
@@ -17,16 +17,17 @@ import numpy as np
 from ja_common.core.geometry import (
     angle_between,
     directions_of_vectors,
+    finite_pair,
     head_rotation,
     rays_of_directions,
 )
 from ja_sim.core.behaviour import ROBOT, Blinking, CaregiverBehaviour
 from ja_sim.core.camera import Intrinsics, Observation, expose
 from ja_sim.core.caregiver import CaregiverBodies, draw_appearance
-from ja_sim.core.gaze import GazePose, GazeShift, missed
+from ja_sim.core.gaze import GazePose, GazeShift, missed_point
 from ja_sim.core.head import JointSample, PanTiltHead
 from ja_sim.core.light import Lighting
-from ja_sim.core.objects import Arrangement, ObjectBodies, Thing
+from ja_sim.core.objects import Arrangement, ObjectBodies, SceneObject
 from ja_sim.core.render import Renderer, buffer_size
 from ja_sim.core.scene import Scene
 
@@ -35,12 +36,12 @@ START_NS = 1_000_000_000  # a stamp of zero means 'no time' in ROS
 
 @dataclass(frozen=True)
 class WorldTruth:
-    """What only the scorer may know, at one instant. Positions [m] in the base frame.
+    """The state of the world at one instant, for the scorer only. Positions [m] in the base frame.
 
     ``attended`` is an index into ``object_ids`` (N,), ``positions`` (N, 3) and ``directions``
     (N, 2) [rad], -1 before the first trial. ``face_direction`` (2,) [rad] is where her face is,
     ``head`` (2,) her head's yaw and pitch (positive to her left, and down), ``gaze_target`` (3,)
-    the point she looks at. ``in_view_at_look`` tells whether the robot, when it looked at her and
+    the point she looks at. ``in_view_at_look``: whether the robot, when it looked at her and
     the trial began, had the attended object in view.
     """
 
@@ -60,13 +61,13 @@ class WorldTruth:
 
 @dataclass(frozen=True)
 class _Exposure:
-    """All that one exposure depends on, so that a late picture shows the world as it was."""
+    """All that one exposure depends on, so that a late picture shows the world of its stamp."""
 
     truth: WorldTruth
     velocity: np.ndarray
     gaze: GazePose
     eyes_closed: bool
-    things: list[Thing]
+    objects: list[SceneObject]
     hand: np.ndarray | None
 
 
@@ -74,7 +75,7 @@ class JointAttentionWorld:
     """A camera head, a caregiver and objects. Same seed and same commands, same pictures."""
 
     def __init__(self, scene: Scene, seed: int, image_size: tuple[int, int] = (320, 240)) -> None:
-        """``image_size`` is (width, height) [px]. Raises RenderError without OpenGL."""
+        """Build the world; ``image_size``: (width, height) [px]. RenderError without OpenGL."""
         self.scene = scene
         self.intrinsics = Intrinsics.of_view(scene.head, image_size)
         self.clamped = False
@@ -86,9 +87,9 @@ class JointAttentionWorld:
         _add_camera(spec, self.intrinsics)
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
-        self._caregiver.bind(self._model)
+        self._caregiver.bind_model(self._model)
         table = self._model.geom('table')
-        self._objects.bind(self._model, float(table.pos[2] + table.size[2]))
+        self._objects.bind_model(self._model, float(table.pos[2] + table.size[2]))
         self._lighting = Lighting(self._model)
         self._camera_mocap = self._model.body('camera').mocapid[0]
         self._renderer: Renderer | None = None
@@ -96,16 +97,16 @@ class JointAttentionWorld:
 
     @property
     def limits(self) -> np.ndarray:
-        """Lowest and highest posture, (2, 2) [rad]: one row each for pan and tilt."""
+        """Return the lowest and highest posture, (2, 2) [rad]: one row each for pan and tilt."""
         return self._head.limits
 
     @property
     def now_ns(self) -> int:
-        """Simulated time [ns]."""
+        """Return the simulated time [ns]."""
         return self._now_ns
 
     def reset(self, seed: int | None = None) -> None:
-        """Start again at time zero, with another seed if one is given."""
+        """Restart at time zero, with another seed if one is given."""
         self._seed = self._seed if seed is None else seed
         streams = np.random.SeedSequence(self._seed).spawn(6)
         looks, objects, behaviour, blinks, self._encoder_rng, self._image_rng = map(
@@ -115,8 +116,8 @@ class JointAttentionWorld:
         self.clamped = False
         self._head.reset()
         caregiver = self._caregiver
-        caregiver.dress(draw_appearance(self.scene.caregiver, looks))
-        self._lighting.vary(self.scene.room.light_variation, looks)
+        caregiver.apply_appearance(draw_appearance(self.scene.caregiver, looks))
+        self._lighting.randomise(self.scene.room.light_variation, looks)
         self._gaze = GazeShift(caregiver.eyes, caregiver.to_rest_frame(np.zeros(3)))
         face = caregiver.face_position(self._gaze.pose(0.0))
         self._arrangement = Arrangement(self.scene.objects, face, objects)
@@ -129,24 +130,19 @@ class JointAttentionWorld:
         self._sample = self._head.read_encoders(self._now_ns, self._encoder_rng)
 
     def rearrange(self) -> None:
-        """Move or replace the objects at once, as the scene says; she turns to where hers is."""
+        """Move or replace the objects now, as the scene specifies; she turns to hers."""
         self._arrangement.rearrange()
         self._turn_to_attended()
 
     def command(self, posture: np.ndarray) -> None:
-        """Send the head to a posture (2,) [rad]; ``clamped`` then tells if it was out of limits.
+        """Send the head to a posture (2,) [rad]; ``clamped`` is then True if it was out of limits.
 
-        Raises ValueError, and leaves the head as it was, if the posture is not two finite numbers.
+        Raises ValueError, and leaves the head unchanged, if the posture is not two finite numbers.
         """
-        posture = np.asarray(posture, float)
-        if posture.shape != (2,) or not np.all(np.isfinite(posture)):
-            raise ValueError(
-                f'a posture is two finite angles (pan, tilt) [rad], not {posture.tolist()}'
-            )
-        self.clamped = self._head.command(posture)
+        self.clamped = self._head.command(finite_pair('a commanded posture', posture))
 
     def step(self, dt: float) -> None:
-        """Let ``dt`` [s] pass: servos, caregiver, objects, and the camera at its own rate."""
+        """Advance by ``dt`` [s]: servos, caregiver, objects, and the camera at its own rate."""
         if not (math.isfinite(dt) and dt > 0.0):
             raise ValueError(f'a time step must be a positive number of seconds, not {dt}')
         end_ns = self._now_ns + round(dt * 1e9)
@@ -167,7 +163,7 @@ class JointAttentionWorld:
         self._sample = self._head.read_encoders(self._now_ns, self._encoder_rng)
 
     def observe(self) -> Observation:
-        """The newest picture that has left the camera; its stamp is the time of exposure."""
+        """Return the newest picture that has left the camera; its stamp is its exposure's."""
         view = self._frame_buffer[0]
         stamp_ns = view.truth.stamp_ns
         if self._observation is None or self._observation.stamp_ns != stamp_ns:
@@ -176,13 +172,13 @@ class JointAttentionWorld:
             self._observation = Observation(image, stamp_ns, self.intrinsics)
         return self._observation
 
-    def picture(
+    def render_picture(
         self, head: np.ndarray | None = None, eyes_closed: bool | None = None
     ) -> np.ndarray:
-        """A sharp picture (H, W, 3) of this moment, with her head turned otherwise for its sake.
+        """Render a sharp picture (H, W, 3) of this moment, with her head turned as given.
 
         ``head`` (2,) [rad] is yaw and pitch; her eyes then look straight ahead. For experiments;
-        the world does not notice.
+        the world does not change.
         """
         view = self._view()
         if head is not None:
@@ -192,31 +188,31 @@ class JointAttentionWorld:
         return self._draw(view)
 
     def joint_state(self) -> JointSample:
-        """The newest reading of the encoders."""
+        """Return the newest reading of the encoders."""
         return self._sample
 
     def truth(self) -> WorldTruth:
-        """How things are now; for the scorer only."""
+        """Return the present state of the world; for the scorer only."""
         positions = self._positions()
-        look = self._behaviour.look
+        response = self._behaviour.response
         face = self._caregiver.face_position(self._gaze.pose(self._time_s, self._target_now()))
         return WorldTruth(
             stamp_ns=self._now_ns,
-            trial=look.trial,
-            attended=look.attended,
-            object_ids=np.array([thing.identifier for thing in self._arrangement.things]),
+            trial=response.trial,
+            attended=response.attended,
+            object_ids=np.array([each.identifier for each in self._arrangement.objects]),
             positions=positions,
             directions=directions_of_vectors(positions),
             face_direction=directions_of_vectors(face),
             head=self._gaze.pose(self._time_s).head,
             gaze_target=self._gaze_point(),
-            reliable=look.reliable,
+            reliable=response.reliable,
             in_view_at_look=self._in_view,
             posture=self._head.posture,
         )
 
     def truth_at_exposure(self) -> WorldTruth:
-        """How things were when the picture was taken that `observe` gives; for the scorer only."""
+        """Return the state at the exposure of the picture of `observe`; for the scorer only."""
         return self._frame_buffer[0].truth
 
     def close(self) -> None:
@@ -235,7 +231,7 @@ class JointAttentionWorld:
         face = self._caregiver.face_position(self._gaze.pose(self._time_s))
         offset = float(angle_between(self._head.posture, directions_of_vectors(face)))
         speed = float(np.linalg.norm(self._head.velocity))
-        count = len(self._arrangement.things)
+        count = len(self._arrangement.objects)
         began = self._behaviour.update(self._time_s, offset, speed, count)
         if began:
             self._arrangement.rearrange()
@@ -250,7 +246,7 @@ class JointAttentionWorld:
 
     def _turn_to_attended(self) -> None:
         behaviour, spec = self._behaviour, self.scene.caregiver
-        share, noise = behaviour.look.head_share, np.array(behaviour.look.head_noise_rad)
+        share, noise = behaviour.response.head_share, np.array(behaviour.response.head_noise_rad)
         if self._attended == ROBOT:
             share, noise = 1.0, np.zeros(2)
         start_s = self._time_s + spec.reaction_s
@@ -258,40 +254,42 @@ class JointAttentionWorld:
         self._turned_s = start_s + spec.turn_s
 
     def _gaze_point(self) -> np.ndarray:
-        """The point she means to look at, (3,) [m]: the robot's camera is the origin."""
+        """Return the gaze target, (3,) [m]: the robot's camera is the origin."""
         if self._attended == ROBOT:
             return np.zeros(3)
-        if not self._behaviour.look.reliable:
+        if not self._behaviour.response.reliable:
             return self._elsewhere
         return self._positions()[self._attended]
 
     def _target_now(self) -> np.ndarray:
-        """Where her eyes point, (3,) [m] in the rest frame: not quite at what she means."""
+        """Return where her eyes point, (3,) [m] in the rest frame: near the gaze target."""
         target = self._caregiver.to_rest_frame(self._gaze_point())
         if self._attended == ROBOT:
             return target
-        return missed(target, self._caregiver.eyes, np.array(self._behaviour.look.gaze_error_rad))
+        return missed_point(
+            target, self._caregiver.eyes, np.array(self._behaviour.response.gaze_error_rad)
+        )
 
     def _positions(self) -> np.ndarray:
-        """Where the objects are now, (N, 3) [m]."""
+        """Return where the objects are now, (N, 3) [m]."""
         shaken = self._shown() if self.scene.caregiver.shows_object == 'shakes' else ROBOT
         return np.array(
             [
-                thing.position_at(self._time_s, shaken=index == shaken)
-                for index, thing in enumerate(self._arrangement.things)
+                each.position_at(self._time_s, shaken=index == shaken)
+                for index, each in enumerate(self._arrangement.objects)
             ]
         )
 
     def _hand(self) -> np.ndarray | None:
-        """Where her hand is, (3,) [m], if she holds an object."""
+        """Return where her hand is, (3,) [m], if she holds an object."""
         held = self._shown()
         if self.scene.caregiver.shows_object != 'holds' or held == ROBOT:
             return None
-        return self._positions()[held] - [0.0, 0.0, self._arrangement.things[held].radius_m]
+        return self._positions()[held] - [0.0, 0.0, self._arrangement.objects[held].radius_m]
 
     def _shown(self) -> int:
-        """The object that she would shake or hold: the one she has turned to."""
-        turned = self._time_s >= self._turned_s and self._behaviour.look.reliable
+        """Return the object to shake or hold: the one she has turned to, or ROBOT."""
+        turned = self._time_s >= self._turned_s and self._behaviour.response.reliable
         return self._attended if turned else ROBOT
 
     def _is_in_view(self, direction: np.ndarray) -> bool:
@@ -304,16 +302,16 @@ class JointAttentionWorld:
             self.truth(),
             self._head.velocity,
             self._gaze.pose(self._time_s, self._target_now()),
-            self._blinking.closed(self._time_s),
-            self._arrangement.things,
+            self._blinking.lids_closed(self._time_s),
+            self._arrangement.objects,
             self._hand(),
         )
 
     def _draw(self, view: _Exposure) -> np.ndarray:
         data = self._data
         self._caregiver.place(data, view.gaze, view.eyes_closed)
-        self._caregiver.reach(data, view.hand)
-        self._objects.dress(view.things)
+        self._caregiver.place_arm(data, view.hand)
+        self._objects.apply_appearance(view.objects)
         self._objects.place(data, view.truth.positions)
         rotation = head_rotation(view.truth.posture)
         mujoco.mju_mat2Quat(data.mocap_quat[self._camera_mocap], rotation.ravel())
@@ -334,7 +332,7 @@ def _room(scene: Scene) -> mujoco.MjSpec:
 
 
 def _add_camera(spec: mujoco.MjSpec, intrinsics: Intrinsics) -> None:
-    """A camera that looks along x of a body at the origin, with exactly these intrinsics."""
+    """Add a camera that looks along x of a body at the origin, with these intrinsics."""
     size = [intrinsics.width, intrinsics.height]
     body = spec.worldbody.add_body(name='camera', mocap=True)
     body.add_camera(

@@ -1,15 +1,15 @@
-"""What is shown of everything that takes time."""
+"""Progress bars on a terminal, lines elsewhere."""
 
 import io
 
 from rich.console import Console
 
-from ja_experiments.progress import Progress
+from ja_experiments.progress_bars import ProgressBars
 
 
 def shown(terminal: bool, steps: list[int], total: int) -> list[str]:
     written = io.StringIO()
-    progress = Progress(Console(file=written, force_terminal=terminal, width=80))
+    progress = ProgressBars(Console(file=written, force_terminal=terminal, width=80))
     with progress.bar('learning', total) as advance:
         for step in steps:
             advance(step)

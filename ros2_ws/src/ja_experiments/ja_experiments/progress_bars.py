@@ -1,4 +1,4 @@
-"""A bar on the terminal for everything that takes time; where there is none, a line a tenth."""
+"""Progress bars of long computations; without a terminal, one line per tenth."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 from rich.progress import Progress as RichProgress
 
 
-class Progress:
-    """Bars one below the other; `advance(n)` may be called from any thread."""
+class ProgressBars:
+    """Shows one bar below the other; `advance(n)` may be called from any thread."""
 
     def __init__(self, console: Console | None = None) -> None:
         self._console = console or Console(stderr=True)
 
-    def say(self, line: str) -> None:
-        """One line above the bars."""
+    def print_line(self, line: str) -> None:
+        """Print one line above the bars."""
         self._console.print(line)
 
     @contextmanager
     def bar(self, label: str, total: int) -> Iterator[Callable[[int], None]]:
-        """A bar while the block runs; gives what moves it on by so many of `total`."""
+        """Show a bar while the block runs; yield the function that advances it towards `total`."""
         if not self._console.is_terminal:
             yield self._tenths(label, total)
             return
@@ -37,13 +37,13 @@ class Progress:
             yield lambda done: bars.advance(task, done)
 
     def _tenths(self, label: str, total: int) -> Callable[[int], None]:
-        done, said = 0, 0
+        done, printed = 0, 0
 
         def advance(more: int) -> None:
-            nonlocal done, said
+            nonlocal done, printed
             done += more
-            if 10 * done // total > said:
-                said = 10 * done // total
-                self.say(f'{label}: {done} of {total}')
+            if 10 * done // total > printed:
+                printed = 10 * done // total
+                self.print_line(f'{label}: {done} of {total}')
 
         return advance

@@ -1,0 +1,86 @@
+"""The command `demo`, for `./ja`."""
+
+import sys
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ja_bringup.commands.options import OnDeath, OnDeathChoice, OneProcess, Record, Swap, View
+from ja_runner.graph import RECORDER, replace_nodes, sim_graph, with_arguments
+
+
+class DemoLearner(str, Enum):
+    """The learner of the demo."""
+
+    gaze_line = 'gaze_line'
+    paper = 'paper'
+
+
+# Five objects around the caregiver; or three, all in the first view, for the paper's network,
+# which needs thousands of trials.
+SCENE = {'gaze_line': 'default', 'paper': 'easy'}
+PRACTICE_TRIALS = {'gaze_line': 300, 'paper': 2000}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to an app."""
+    app.command()(demo)
+
+
+def demo(
+    context: typer.Context,
+    learner: Annotated[
+        DemoLearner, typer.Option(help="The fast learner, or the paper's network.")
+    ] = DemoLearner.gaze_line,
+    trials: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help=f'Practise for so many trials; {PRACTICE_TRIALS["gaze_line"]} by default, '
+            f"{PRACTICE_TRIALS['paper']} with the paper's learner.",
+        ),
+    ] = None,
+    time_s: Annotated[
+        float, typer.Option('--time', min=0.0, help='Practise for so many seconds at most.')
+    ] = 120.0,
+    exam_trials: Annotated[
+        int,
+        typer.Option('--exam', min=0, help='Trials of the learner alone at the end; 0: no exams.'),
+    ] = 100,
+    seed: Annotated[int, typer.Option(min=0, help='Seed of the world and of the robot.')] = 0,
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            help=f'Scene of the sim, by name or file; by default {SCENE["gaze_line"]}, or with '
+            f"the paper's learner {SCENE['paper']}."
+        ),
+    ] = None,
+    draw_ahead: Annotated[
+        bool,
+        typer.Option(
+            '--draw-ahead',
+            help='Draw the next picture while the nodes process the last one: more images a '
+            'second, but each command takes effect one picture later.',
+        ),
+    ] = False,
+    resume: Annotated[
+        Path | None, typer.Option(help='Resume the run in this folder, with all that it learned.')
+    ] = None,
+    swap: Swap = None,
+    record: Record = False,
+    one_process: OneProcess = False,
+    view: View = True,
+    on_death: OnDeath = OnDeathChoice.stop,
+) -> None:
+    """Watch the simulated head learn to follow the caregiver's gaze."""
+    from ja_bringup.course import standard_course
+    from ja_bringup.demo import run_demo
+
+    arguments = context.obj or []
+    sim = {'scene': scene or SCENE[learner.value], 'draw_ahead': draw_ahead}
+    graph = replace_nodes(sim_graph(seed, sim, learner.value), swap or ())
+    stages = standard_course(trials or PRACTICE_TRIALS[learner.value], time_s, exam_trials)
+    graph = with_arguments([*[RECORDER] * record, *graph], arguments)
+    sys.exit(run_demo(graph, stages, one_process, on_death.value, arguments, view, resume))

@@ -1,0 +1,26 @@
+"""Options that several commands of `./ja` share."""
+
+from enum import Enum
+from typing import Annotated
+
+import typer
+
+
+class OnDeathChoice(str, Enum):
+    """What happens when a node dies."""
+
+    stop = 'stop'
+    restart = 'restart'
+
+
+OnDeath = Annotated[OnDeathChoice, typer.Option(help='What to do when a node dies.')]
+OneProcess = Annotated[bool, typer.Option('--one-process', help='All nodes in one process.')]
+Record = Annotated[bool, typer.Option('--record', help='Record all topics into runs/.')]
+View = Annotated[bool, typer.Option(help='Serve the live page, and print its address.')]
+Swap = Annotated[
+    list[str] | None,
+    typer.Option(
+        help='Run your node in place of one of ours: gate=my_lab/my_gate. May be given several '
+        'times.'
+    ),
+]

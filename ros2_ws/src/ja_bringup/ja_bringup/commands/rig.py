@@ -1,0 +1,50 @@
+"""The command `rig`, for `./ja`."""
+
+import sys
+from typing import Annotated
+
+import typer
+
+from ja_bringup.commands.options import OnDeath, OnDeathChoice, OneProcess, Record, Swap, View
+from ja_runner.graph import RECORDER, replace_nodes, rig_graph, with_arguments
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to an app."""
+    app.command()(rig)
+
+
+def rig(
+    context: typer.Context,
+    source: Annotated[
+        str | None,
+        typer.Option(
+            help='Webcam device, video file or image folder, in which a digital head looks '
+            "around. Without it, the graph uses the rig's own camera and motors."
+        ),
+    ] = None,
+    time_s: Annotated[
+        float, typer.Option('--time', min=0.0, help='End after so many seconds.')
+    ] = 0.0,
+    swap: Swap = None,
+    record: Record = False,
+    one_process: OneProcess = False,
+    view: View = True,
+    on_death: OnDeath = OnDeathChoice.stop,
+) -> None:
+    """Run the same graph on real pictures: a digital head in them, or a rig's own motors."""
+    from ja_runner.run import new_run_folder, run_graph
+
+    arguments = context.obj or []
+    graph = replace_nodes(rig_graph(source), swap or ())
+    code, _ = run_graph(
+        with_arguments([*[RECORDER] * record, *graph], arguments),
+        new_run_folder('rig'),
+        'Joint attention, on real pictures',
+        lambda node: 0.0 < time_s < node.elapsed_s,
+        one_process=one_process,
+        view=view,
+        on_death=on_death.value,
+        arguments=arguments,
+    )
+    sys.exit(code)

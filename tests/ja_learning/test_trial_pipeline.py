@@ -1,0 +1,96 @@
+"""The trial pipeline: which trials it hands over, in which order, and what it proposes meanwhile."""
+
+import numpy as np
+import pytest
+
+from ja_common.core.posture import Posture
+from ja_learning.core.look_around import LookAroundConfig
+from ja_learning.core.trial import FACE_SHAPE
+from ja_learning.core.trial_pipeline import BELIEF_SAMPLES, TrialPipeline
+
+FACE = np.full(FACE_SHAPE, 100, np.uint8)
+CENTRE = np.zeros(2)
+TURN = np.array([0.3, 0.1])
+
+
+class Log:
+    """A predictor that logs when it is asked; `on_trial` logs into the same list."""
+
+    log_evidence = 1.5
+
+    def __init__(self):
+        self.events = []
+
+    def propose(self, face, face_at, posture, candidates):
+        self.events.append('propose')
+        return TURN
+
+    def belief(self, face, face_at, rng, count):
+        return np.tile(TURN, (count, 1))
+
+    def on_trial(self, trial, posture):
+        self.events.append('given up' if trial.fixation is None else 'fixated')
+        self.trial, self.posture = trial, posture
+
+
+class Head:
+    """The images of a head that turns from one rest to the next."""
+
+    def __init__(self, log):
+        self.pipeline = TrialPipeline(lambda: log, log.on_trial, LookAroundConfig(), 0.05, seed=0)
+        self.stamp_ns = 0
+
+    def at(self, pan):
+        self.stamp_ns += 100
+        return Posture(self.stamp_ns, np.array([pan, 0.0]), np.zeros(2))
+
+    def look(self):
+        return self.pipeline.process_image(self.at(0.0), np.empty((0, 2)), (FACE, CENTRE))
+
+    def rest(self, pan, rays=()):
+        rays = np.reshape(np.array(rays), (-1, 2))
+        return self.pipeline.process_image(self.at(pan), rays, None)
+
+
+@pytest.fixture
+def log():
+    return Log()
+
+
+@pytest.fixture
+def head(log):
+    return Head(log)
+
+
+def test_a_fixation_hands_over_the_trial_with_the_posture_that_ended_it(head, log):
+    head.look()
+    head.rest(0.3, [(0.1, 0.0)])
+    end = head.at(0.3)
+    trial = head.pipeline.process_fixation(end, (0.4, 0.1))
+    assert trial is log.trial
+    assert log.posture is end
+    assert trial.fixation == pytest.approx([0.4, 0.1])
+    assert log.events == ['propose', 'propose', 'fixated']
+    assert head.pipeline.process_fixation(head.at(0.3), (0.4, 0.1)) is None
+    assert log.events[-1] == 'fixated', 'no second trial'
+
+
+def test_a_look_proposes_before_it_hands_over_the_trial_that_was_given_up(head, log):
+    head.look()
+    head.rest(0.3, [(0.1, 0.0)])
+    log.events.clear()
+    head.look()
+    assert log.events == ['propose', 'given up']
+    assert len(log.trial.candidates) == 1
+
+
+def test_nothing_is_proposed_between_trials(head, log):
+    assert head.rest(0.0).delta is None
+    assert log.events == []
+    assert head.pipeline.draw_belief(np.random.default_rng(0)).shape == (0, 2)
+    proposal = head.look()
+    assert proposal.delta is TURN
+    assert proposal.log_evidence == 1.5
+    assert head.pipeline.draw_belief(np.random.default_rng(0)).shape == (BELIEF_SAMPLES, 2)
+    head.pipeline.drop_trial()
+    assert head.rest(0.3).delta is None
