@@ -1,4 +1,4 @@
-"""Trials of a made-up life, for learners that have no world: the same number, the same trial."""
+"""Made-up trials, for learners without a world: the same number gives the same trial."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from ja_learning.core.trial import Trial
 
 
 def trial(number: int) -> Trial:
-    """A face, one shift from the look, and four objects of which the first is fixated."""
+    """Make a trial: a face, one shift from the look, four objects; the first one is fixated."""
     random = np.random.default_rng(number)
     face = random.integers(0, 256, (30, 25)).astype(np.uint8)
     candidates = random.uniform(-0.5, 0.5, (4, 2))

@@ -34,7 +34,7 @@ def day(count: int = TRIALS) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
 
 
 def messages_of(trials, with_truth: bool = True):
-    """Yield the messages of two images a trial: the look, and the fixation of the attended object."""
+    """Yield the messages of two images a trial: the look, the fixation of the attended object."""
     for number, (face, attended, other) in enumerate(trials):
         for part, posture in enumerate((LOOK, attended)):
             stamp_ns = (2 * number + part) * NS_PER_S // 10

@@ -33,7 +33,7 @@ HOME_OF = {
 
 
 def nodes_of(kind: type) -> Iterator[tuple[Path, ast.AST]]:
-    """Every syntax node of a kind in the sources, with its file."""
+    """Yield every syntax node of a kind in the sources, with its file."""
     for path, tree in TREES.items():
         for node in ast.walk(tree):
             if isinstance(node, kind):
@@ -41,7 +41,7 @@ def nodes_of(kind: type) -> Iterator[tuple[Path, ast.AST]]:
 
 
 def called(node: ast.AST | None) -> str:
-    """Name of the function or method that a call calls; '' when it is no call."""
+    """Return the name of the function or method that is called; '' for anything but a call."""
     function = getattr(node, 'func', None)
     return getattr(function, 'id', getattr(function, 'attr', ''))
 
@@ -56,7 +56,8 @@ def test_sources_were_found():
 
 
 def test_every_parameter_has_a_description():
-    calls = [(path, node) for path, node in nodes_of(ast.Call) if called(node) == 'parameter']
+    makers = ('parameter', 'interval_parameter')
+    calls = [(path, node) for path, node in nodes_of(ast.Call) if called(node) in makers]
     assert len(calls) > 40
     wrong = [
         (path, node.lineno)
@@ -84,7 +85,7 @@ def test_configurations_of_nodes_consist_of_described_parameters():
 
 
 def test_parameters_are_declared_in_one_place():
-    """So that none escapes its description, its range and its check."""
+    """Check it, so that every parameter has a description, a range and a check."""
     declaring = {p for p, node in nodes_of(ast.Call) if called(node) == 'declare_parameter'}
     assert declaring == {Path('ja_common/ja_common/parameters.py')}
 
@@ -165,6 +166,20 @@ def test_private_api_of_rclpy_is_used_in_one_module():
     assert imports | uses | names == {Path('ja_common/ja_common/rclpy_private.py')}
 
 
+def test_contexts_are_made_in_one_module():
+    """Check that a node's `main`, and a benchmark's own program, are the only exceptions."""
+    makers = {
+        path
+        for path, node in nodes_of(ast.Call)
+        if ast.unparse(node.func) in ('rclpy.init', 'init', 'Context', 'rclpy.context.Context')
+    }
+    assert makers == {
+        Path('ja_common/ja_common/private_context.py'),
+        Path('ja_common/ja_common/graph_node.py'),
+        Path('ja_diagnostics/ja_diagnostics/image_stream.py'),
+    }
+
+
 def _holder(attribute: ast.Attribute) -> str:
     """Return the last name before the attribute: `node` in `self.node._parameters`."""
     return ast.unparse(attribute.value).split('.')[-1]
@@ -199,7 +214,7 @@ def test_heavy_library_is_loaded_only_where_it_is_at_home(library):
 
 
 def test_relative_imports_stay_in_their_folder():
-    """What leaves it says its full name, so that the rules of the rooms see it."""
+    """Check that others are absolute, so that `graph/test_rooms.py` sees them."""
     wrong = [(path, node.lineno) for path, node in nodes_of(ast.ImportFrom) if node.level > 1]
     assert not wrong
 
@@ -216,7 +231,7 @@ def test_no_two_public_classes_share_a_name():
 
 
 def test_topic_names_stand_in_their_table_alone():
-    """No node reaches a topic, least of all the truth, by writing its name."""
+    """Check that no module reaches a topic, above all the truth, by writing its name."""
     names = {topic.name for topic in TOPICS if '/' in topic.name}
     wrong = [
         (path, node.lineno, node.value)

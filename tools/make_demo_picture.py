@@ -1,4 +1,4 @@
-"""Makes docs/images/demo.png: what the robot sees, beside the success curve of a demo.
+"""Make docs/images/demo.png: what the robot sees, beside the success curve of a demo.
 
 .venv/bin/python tools/make_demo_picture.py runs/<time>-demo/success_curve.png
 """
@@ -22,7 +22,7 @@ OUTPUT = Path(__file__).parents[1] / 'docs' / 'images' / 'demo.png'
 
 
 def picture_of_a_look() -> np.ndarray:
-    """BGR picture, 640 x 480, of the moment in which the face shows where she looks."""
+    """Return a BGR picture, 640 x 480, in which the face shows where she looks."""
     world = JointAttentionWorld(load_scene('easy'), seed=4, image_size=(640, 480))
     detector = SalientFeatureDetector(BlazeFace())
     lens = world.intrinsics

@@ -82,6 +82,14 @@ def test_tests_need_one_step_more(checkout):
     assert environment.did() == []
 
 
+def test_the_pages_need_one_step_more(checkout):
+    environment = Recorded(checkout)
+    environment.prepare()
+    environment.did()
+    environment.prepare(docs=True)
+    assert environment.did() == ['docs.lock']
+
+
 def installed(environment: Recorded) -> set[str]:
     """Names of the packages of ours that the last command installed."""
     return {Path(word).name for word in environment.commands[-1].split() if 'ros2_ws' in word}

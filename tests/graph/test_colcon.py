@@ -1,4 +1,4 @@
-"""The packages as a rig builds them: `colcon build`, then an executable of the install tree."""
+"""The packages as a rig builds them: `colcon build`, an executable of it, and `colcon test`."""
 
 import os
 import shutil
@@ -6,7 +6,9 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
+import pytest
 from rclpy.node import Node
 
 from ja_common.executor import CachedWaitSetExecutor
@@ -16,15 +18,29 @@ SOURCES = Path(__file__).parents[2] / 'ros2_ws' / 'src'
 IN_WORKSPACE = 'source install/setup.bash && exec "$@"'
 
 
-def test_a_node_of_the_built_workspace_runs(tmp_path, ros_context):
-    colcon = shutil.which('colcon', path=Path(sys.executable).parent)
-    assert colcon, 'colcon is not installed beside this Python'
-    environ = {**os.environ, 'PATH': f'{Path(colcon).parent}:{os.environ["PATH"]}'}
-    built = subprocess.run(
-        [colcon, 'build', '--base-paths', str(SOURCES)],
-        cwd=tmp_path, env=environ, capture_output=True, text=True, check=False,
+# Of all packages, the quickest tests; test_manifests.py compares the setup.cfg of the others.
+TESTED = ('ja_control', 'ja_runner')
+
+
+@pytest.fixture
+def environ(domain: int) -> dict[str, str]:
+    """Return an environment in which colcon starts this Python, in the test's own domain."""
+    return {**os.environ, 'PATH': f'{Path(sys.executable).parent}:{os.environ["PATH"]}'}
+
+
+def colcon(folder: Path, environ: dict[str, str], verb: str, *options: str) -> None:
+    """Run colcon on our packages, with build/ and install/ in the folder; fail if it fails."""
+    command = shutil.which('colcon', path=Path(sys.executable).parent)
+    assert command, 'colcon is not installed beside this Python'
+    done = subprocess.run(
+        [command, verb, '--base-paths', str(SOURCES), *options],
+        cwd=folder, env=environ, capture_output=True, text=True, check=False,
     )  # fmt: skip
-    assert built.returncode == 0, built.stdout + built.stderr
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_node_of_the_built_workspace_runs(tmp_path, environ, ros_context):
+    colcon(tmp_path, environ, 'build')
 
     install = tmp_path / 'install'
     sourced = ['bash', '-c', IN_WORKSPACE, 'bash']
@@ -56,8 +72,20 @@ def test_a_node_of_the_built_workspace_runs(tmp_path, ros_context):
     assert 'Traceback' not in errors
 
 
+@pytest.mark.slow
+def test_colcon_runs_the_tests_of_a_package(tmp_path, environ):
+    colcon(tmp_path, environ, 'build', '--packages-up-to', *TESTED)
+    selected = ('--packages-select', *TESTED)
+    colcon(tmp_path, environ, 'test', *selected, '--return-code-on-test-failure')
+    for package in TESTED:
+        [suite] = ElementTree.parse(tmp_path / 'build' / package / 'pytest.xml').getroot()
+        files = list((SOURCES.parents[1] / 'tests' / package).glob('test_*.py'))
+        assert int(suite.get('tests')) > len(files)
+        assert suite.get('failures') == suite.get('errors') == '0'
+
+
 def _data(package: Path) -> set[str]:
-    """Relative paths of all the files that are not Python's, nor its caches'."""
+    """Return the relative paths of all files that are neither Python's nor its caches'."""
     return {
         str(path.relative_to(package))
         for path in package.rglob('*')

@@ -1,6 +1,6 @@
 """The live page of a running graph in a real browser; docs/view.md says what it needs.
 
-JA_SCREENSHOTS=FOLDER keeps what it saw.
+JA_SCREENSHOTS=FOLDER keeps screenshots.
 """
 
 import os
@@ -29,13 +29,19 @@ SCREENS = [('laptop', 1366, 1000, False), ('phone', 390, 844, True)]
 
 @pytest.fixture
 def demo(domain: int, tmp_path: Path) -> Iterator[tuple[str, int]]:
-    """A demo that runs: the address of its page, and its process id."""
+    """Start a demo; return the address of its page and its process id."""
     process = subprocess.Popen(
         [sys.executable, '-m', 'ja_bringup.cli', 'demo', '--exam', '0', '--on-death', 'restart'],
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )  # fmt: skip
-    line = next(line for line in iter(process.stdout.readline, '') if 'live page: ' in line)
-    yield line.split('live page: ')[1].strip(), process.pid
+    lines = []
+    for line in iter(process.stdout.readline, ''):
+        lines.append(line)
+        if 'live page: ' in line:
+            break
+    else:
+        raise AssertionError(f'the demo ended without an address: {"".join(lines)}')
+    yield lines[-1].split('live page: ')[1].strip(), process.pid
     process.send_signal(signal.SIGINT)
     output, _ = process.communicate(timeout=60)
     assert process.returncode == 0, output
@@ -71,7 +77,7 @@ def browse() -> Iterator[Callable]:
 def wait(condition: Callable[[], object], timeout_s: float = 60.0) -> None:
     end = time.monotonic() + timeout_s
     while not condition():
-        assert time.monotonic() < end, 'the page did not come so far'
+        assert time.monotonic() < end, f'not within {timeout_s:g} s'
         time.sleep(0.1)
 
 
@@ -86,22 +92,32 @@ def text(browser) -> str:
 
 
 def picture(browser) -> np.ndarray:
-    """The robot's picture as the browser shows it."""
+    """Return the robot's picture as the browser shows it, (H, W, 3) BGR."""
     png = browser.find_element('css selector', 'img').screenshot_as_png
     return cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)
 
 
+def source(browser) -> str:
+    return browser.execute_script("return document.images[0]?.src ?? ''")
+
+
+def wait_for_picture(browser) -> None:
+    wait(lambda: browser.execute_script('return document.images[0]?.naturalWidth') == 640)
+
+
 @pytest.mark.parametrize('screen', SCREENS, ids=lambda screen: screen[0])
-def test_people_see_and_steer_the_robot(screen, demo, browse):
+def test_a_viewer_sees_and_controls_the_robot(screen, demo, browse):
     name, width, height, phone = screen
     browser = browse(width, height, phone)
     browser.get(demo[0])
     wait(lambda: 'running' in text(browser) and 'fixated by' in text(browser))
-    wait(lambda: browser.execute_script('return document.images[0]?.naturalWidth') == 640)
-    first = picture(browser)
+    wait_for_picture(browser)
+    first, first_source = picture(browser), source(browser)
+    # A new picture, not only a change of its style.
+    wait(lambda: source(browser) != first_source)
     wait(lambda: np.abs(picture(browser).astype(int) - first).mean() > 2)
     wide = browser.execute_script('return document.documentElement.scrollWidth')
-    assert wide <= width, 'nothing sticks out to the side'
+    assert wide <= width, 'no element is wider than the screen'
     keep(browser, name)
 
     toggle = browser.find_element('xpath', "//div[contains(@class,'q-toggle')][.='pause']")
@@ -109,7 +125,9 @@ def test_people_see_and_steer_the_robot(screen, demo, browse):
     wait(lambda: 'the simulation is paused' in text(browser))
     keep(browser, f'{name}_paused')
     toggle.click()
+    paused = source(browser)
     wait(lambda: 'the simulation is paused' not in text(browser))
+    wait(lambda: source(browser) != paused)
 
 
 def test_a_frozen_graph_is_shown_as_stopped(demo, browse):
@@ -117,19 +135,22 @@ def test_a_frozen_graph_is_shown_as_stopped(demo, browse):
     address, pid = demo
     browser.get(address)
     wait(lambda: 'fixated by' in text(browser))
+    wait_for_picture(browser)
     bright = picture(browser).mean()
     sim = child(pid, 'ja_sim.sim_node')
     os.kill(sim, signal.SIGSTOP)
     try:
         wait(lambda: 'no new image for' in text(browser))
-        assert picture(browser).mean() < 0.7 * bright, 'the old picture is darkened'
+        wait(lambda: picture(browser).mean() < 0.7 * bright)  # the old picture is darkened
+        frozen = source(browser)
         keep(browser, 'stopped')
     finally:
         os.kill(sim, signal.SIGCONT)
     wait(lambda: 'no new image for' not in text(browser))
+    wait(lambda: source(browser) != frozen)
 
 
 def child(parent: int, module: str) -> int:
-    """Process id of the node that a demo has started."""
+    """Return the process id of a node that a demo has started."""
     children = Path(f'/proc/{parent}/task/{parent}/children').read_text().split()
     return next(int(p) for p in children if module in Path(f'/proc/{p}/cmdline').read_text())

@@ -91,7 +91,7 @@ def test_the_gain_is_how_far_a_joint_goes_for_a_radian() -> None:
     assert fit_gain(commanded, 0.9 * commanded + 0.3).value == pytest.approx(0.9)
 
 
-def test_the_file_holds_the_signs_of_the_rig_and_omits_an_uncertain_delay(ideal: Calibration) -> None:
+def test_the_file_holds_the_signs_and_omits_an_uncertain_delay(ideal: Calibration) -> None:
     optics = replace(ideal.optics, signs=(-1.0, 1.0))
     contents = as_dict(replace(ideal, optics=optics), (True, True), (320, 240))
     assert (contents['pan_inverted'], contents['tilt_inverted']) == (False, True)

@@ -11,6 +11,7 @@ from ja_common.core.geometry import (
     angle_between,
     directions_of_rays,
     directions_of_vectors,
+    finite_pair,
     head_rotation,
     rays_of_directions,
     vectors_of_directions,
@@ -93,3 +94,18 @@ def test_angle_is_that_of_the_great_circle():
     # Tiny angles are exact where the arc cosine would give nought.
     assert angle_between((0.0, 0.0), (1e-9, 0.0)) == pytest.approx(1e-9)
     assert angle_between((0.0, 0.0), (math.pi, 0.0)) == pytest.approx(math.pi)
+
+
+@pytest.mark.parametrize(
+    'values', [(0.1,), (0.1, 0.2, 0.3), 0.1, (np.nan, 0.0), (0.0, np.inf), []]
+)
+def test_pair_that_is_not_two_finite_numbers_is_refused(values):
+    with pytest.raises(ValueError, match=r'^a posture must be two finite numbers \(pan, tilt\)'):
+        finite_pair('a posture', values)
+
+
+def test_pair_is_a_copy():
+    values = np.array([1, 2])
+    pair = finite_pair('a posture', values)
+    assert pair.tolist() == [1.0, 2.0]
+    assert not np.shares_memory(pair, values)

@@ -4,9 +4,17 @@ import cv2
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from sensor_msgs.msg import CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from std_msgs.msg import Header
 
-from ja_common.image_codec import ImageError, decode_compressed, decode_image, encode_image
+from ja_common.image_codec import (
+    ImageError,
+    decode_camera_info,
+    decode_compressed,
+    decode_image,
+    encode_camera_info,
+    encode_image,
+)
 
 RGB = np.random.default_rng(1).integers(0, 256, (5, 7, 3), np.uint8)
 GREY = RGB[..., 0]
@@ -113,3 +121,19 @@ def test_png_and_jpeg():
 def test_broken_compressed_data_is_refused(data):
     with pytest.raises(ImageError, match='no readable picture'):
         decode_compressed(CompressedImage(format='jpeg', data=data))
+
+
+def test_a_calibration_is_scaled_to_the_size_of_the_image():
+    camera = decode_camera_info(encode_camera_info(Header(), 640, 480, 500.0), 320, 240)
+    assert (camera.width, camera.height, camera.fx, camera.cx) == (320, 240, 250.0, 159.5)
+
+
+def test_a_calibration_without_a_size_is_that_of_the_image():
+    info = encode_camera_info(Header(), 320, 240, 250.0)
+    info.width = info.height = 0
+    assert decode_camera_info(info, 320, 240).fx == 250.0
+
+
+@pytest.mark.parametrize('info', [None, CameraInfo()])
+def test_without_a_calibration_there_is_no_camera(info):
+    assert decode_camera_info(info, 320, 240) is None

@@ -57,7 +57,8 @@ def test_first_joint_state_ends_the_impatience(images, postures):
     images.queue_item(20, 'b', 1.2)
     assert list(images.pop_ready(True, 1.3)) == []
     postures.record_posture(20, (0, 0))
-    assert list(images.pop_ready(True, 1.4))[0][2] is not None
+    ((_, _, posture),) = images.pop_ready(True, 1.4)
+    assert posture is not None
 
 
 def test_lost_joint_states_let_images_go_on_without_a_posture(images, postures):

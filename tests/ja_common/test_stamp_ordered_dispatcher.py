@@ -8,7 +8,7 @@ from ja_common.core.stamp_ordered_dispatcher import StampOrderedDispatcher
 
 
 class Acted(list):
-    """The actions that have run, in order; `queue('a', 3)` is a message of kind a about image 3."""
+    """The actions that have run, in order; `queue` adds a message of a kind about an image."""
 
     def __init__(self) -> None:
         super().__init__()

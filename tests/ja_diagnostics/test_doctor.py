@@ -2,8 +2,10 @@
 
 import mmap
 import os
+import shutil
 import socket
 import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -35,7 +37,14 @@ def test_the_version_of_python(version, ok, monkeypatch):
 
 def test_shared_memory_that_is_not_there(tmp_path):
     assert not check_shared_memory(tmp_path / 'none').ok
-    assert ' MB free in ' in check_shared_memory(tmp_path).text
+
+
+@pytest.mark.parametrize(('free_mb', 'ok'), [(63, False), (64, True)])
+def test_shared_memory_must_have_room_for_images(free_mb, ok, tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, 'disk_usage', lambda _: SimpleNamespace(free=free_mb * 10**6))
+    finding = check_shared_memory(tmp_path)
+    assert finding.text.startswith(f'{free_mb} MB free')
+    assert (finding.ok, bool(finding.fix)) == (ok, not ok)
 
 
 def test_segments_in_use_are_not_stale(tmp_path, monkeypatch):

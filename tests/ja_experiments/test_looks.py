@@ -10,7 +10,7 @@ from ja_experiments.datasets.looks import Looks, load_looks
 
 
 class Renderer:
-    """Counts how often looks are rendered."""
+    """A stand-in for the renderer that counts its calls."""
 
     def __init__(self, looks: Looks) -> None:
         self.looks = looks

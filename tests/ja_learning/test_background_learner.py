@@ -1,4 +1,4 @@
-"""Learning beside inference: who asks never waits for a lesson, unless it wants to."""
+"""Learning beside inference: no question waits for an update, except in lockstep."""
 
 import threading
 
@@ -14,7 +14,7 @@ PATIENCE_S = 10.0
 
 
 class SlowLearner:
-    """Knows how many lessons it had; every lesson lasts until it is allowed to end."""
+    """Counts its updates; every update lasts until it is allowed to end."""
 
     kind = 'slow'
 
@@ -23,10 +23,10 @@ class SlowLearner:
         self.begun = threading.Semaphore(0)
         self.may_end = threading.Semaphore(0)
 
-    def update(self, lesson):
+    def update(self, trial):
         self.begun.release()
         assert self.may_end.acquire(timeout=PATIENCE_S)
-        if lesson is None:
+        if trial is None:
             raise ValueError('nothing to learn from')
         self.trials += 1
 
@@ -34,7 +34,7 @@ class SlowLearner:
         return f'after {self.trials}'
 
 
-def settle(background):
+def wait_for_all(background):
     """Wait until all is learned."""
     background.call_with_learner(lambda learner: None)
 
@@ -57,30 +57,30 @@ def make():
         background.close(0.0)
 
 
-def test_the_snapshot_before_answers_until_the_lesson_is_over(make, slow):
+def test_the_snapshot_before_answers_until_the_update_is_over(make, slow):
     background = make(slow)
     background.update(trial(0))
     assert slow.begun.acquire(timeout=PATIENCE_S)
     assert background.predictor == 'after 0'
     assert (background.trials, background.waiting) == (1, 1)
     slow.may_end.release()
-    settle(background)
+    wait_for_all(background)
     assert background.predictor == 'after 1'
     assert (background.trials, background.waiting) == (1, 0)
 
 
-def test_lessons_are_learned_one_by_one_in_the_order_in_which_they_came(make, slow):
+def test_trials_are_learned_one_by_one_in_the_order_in_which_they_came(make, slow):
     slow.may_end.release(5)
     learned = []
     background = make(slow, lambda learner: learned.append(learner.trials))
     for number in range(5):
         background.update(trial(number))
-    settle(background)
+    wait_for_all(background)
     assert learned == [1, 2, 3, 4, 5]
     assert background.pop_errors() == []
 
 
-def test_the_learner_is_asked_when_it_has_learned_all(make, slow):
+def test_a_function_is_called_with_the_learner_when_all_is_learned(make, slow):
     slow.may_end.release(2)
     background = make(slow)
     background.update(trial(0))
@@ -88,44 +88,44 @@ def test_the_learner_is_asked_when_it_has_learned_all(make, slow):
     assert background.call_with_learner(lambda learner: learner.trials) == 2
 
 
-def test_in_step_the_same_lessons_show_however_quick_they_were(make, slow):
+def test_in_lockstep_the_same_updates_show_however_quick_they_were(make, slow):
     background = make(slow, behind=1)
     slow.may_end.release(2)
     background.update(trial(0))
-    settle(background)
-    assert background.predictor == 'after 0', 'the newest lesson never shows, though it is over'
+    wait_for_all(background)
+    assert background.predictor == 'after 0', 'the newest update never shows, though it is over'
     background.update(trial(1))
     assert background.predictor == 'after 1', 'the one before it is waited for'
-    settle(background)
+    wait_for_all(background)
     assert background.predictor == 'after 1'
 
 
-def test_a_lesson_that_fails_is_told_and_the_next_is_learned(make, slow):
+def test_an_update_that_fails_is_reported_and_the_next_trial_is_learned(make, slow):
     slow.may_end.release(2)
     background = make(slow)
     background.update(None)
     background.update(trial(0))
-    settle(background)
+    wait_for_all(background)
     assert [str(error) for error in background.pop_errors()] == ['nothing to learn from']
     assert background.pop_errors() == []
     assert background.predictor == 'after 1'
 
 
-def test_what_fails_after_a_lesson_is_told_and_the_lesson_is_kept(make, slow):
+def test_what_fails_after_an_update_is_reported_and_the_update_is_kept(make, slow):
     def save(_learner):
         raise OSError('the disk is full')
 
     slow.may_end.release()
     background = make(slow, save)
     background.update(trial(0))
-    settle(background)
+    wait_for_all(background)
     assert [str(error) for error in background.pop_errors()] == ['the disk is full']
     assert background.predictor == 'after 1'
     with pytest.raises(OSError, match='the disk is full'):
         background.call_with_learner(save)
 
 
-def test_to_close_is_to_learn_what_was_handed_over(slow):
+def test_close_learns_what_was_handed_over(slow):
     background = BackgroundLearner(slow, lambda learner: None)
     background.update(trial(0))
     slow.may_end.release()
@@ -133,7 +133,7 @@ def test_to_close_is_to_learn_what_was_handed_over(slow):
     assert slow.trials == 1
 
 
-def test_what_would_take_too_long_at_the_end_is_left(slow):
+def test_close_drops_what_would_take_too_long(slow):
     background = BackgroundLearner(slow, lambda learner: None)
     for number in range(3):
         background.update(trial(number))
@@ -149,7 +149,7 @@ def test_it_learns_what_it_would_have_learned_in_one_thread(make):
     for number in range(20):
         alone.update(trial(number))
         background.update(trial(number))
-        # Asking meanwhile must disturb nothing.
+        # A question meanwhile must change nothing.
         background.predictor.propose(trial(number).face, (0, 0), (0, 0), [(0.1, 0.2)])
     state = background.call_with_learner(GazeLineLearner.state)
     for name, array in alone.state().items():

@@ -112,7 +112,7 @@ def test_other_format_is_named(path):
         load_checkpoint(path)
 
 
-def test_what_wrote_it_is_told(path):
+def test_the_versions_that_wrote_it_are_in_it(path):
     save_checkpoint(path, ARRAYS, {'learner': 'paper'})
     _, description = load_checkpoint(path)
     assert description['versions']['numpy'] == np.__version__

@@ -23,7 +23,7 @@ def untrained(kind='paper', seed=0, **network):
     return make_learner(kind, seed, NetworkConfig(**network) if kind == 'paper' else gaze_line)
 
 
-def taught(trials=3, **choice):
+def trained(trials=3, **choice):
     learner = untrained(**choice)
     for number in range(trials):
         learner.update(trial(number))
@@ -31,9 +31,9 @@ def taught(trials=3, **choice):
 
 
 def same(one, other):
-    ours, theirs = one.state(), other.state()
-    return ours.keys() == theirs.keys() and all(
-        np.array_equal(ours[name], theirs[name]) for name in ours
+    ours, tresumeds = one.state(), other.state()
+    return ours.keys() == tresumeds.keys() and all(
+        np.array_equal(ours[name], tresumeds[name]) for name in ours
     )
 
 
@@ -53,27 +53,27 @@ def names(folder):
 
 
 @pytest.mark.parametrize('kind', KINDS)
-def test_another_process_would_go_on_as_if_nothing_had_happened(folder, kind):
-    learner = taught(30, kind=kind)
+def test_another_process_continues_bit_for_bit(folder, kind):
+    learner = trained(30, kind=kind)
     path = folder.save(learner)
-    heir = untrained(kind=kind, seed=9)
-    assert folder.resume_into(heir) == Resumed(path, [])
-    assert same(heir, learner)
+    resumed = untrained(kind=kind, seed=9)
+    assert folder.resume_into(resumed) == Resumed(path, [])
+    assert same(resumed, learner)
     for number in range(30, 40):
         learner.update(trial(number))
-        heir.update(trial(number))
-    assert same(heir, learner)
+        resumed.update(trial(number))
+    assert same(resumed, learner)
 
 
-def test_the_file_tells_the_whole_configuration(folder):
-    learner = taught(face_scaling='standardised')
+def test_the_file_holds_the_whole_configuration(folder):
+    learner = trained(face_scaling='standardised')
     _, description = load_checkpoint(folder.save(learner))
     assert description['learner'] == 'paper'
     assert description['trials'] == 3
     assert NetworkConfig(**description['configuration']) == learner.config
 
 
-def test_nothing_to_take_up_is_no_fault(folder):
+def test_an_empty_folder_is_no_error(folder):
     learner = untrained()
     assert folder.resume_into(learner) == Resumed(None, [])
     assert same(learner, untrained())
@@ -81,28 +81,28 @@ def test_nothing_to_take_up_is_no_fault(folder):
 
 def test_older_ones_are_kept_and_numbers_rise_over_restarts(folder):
     for _ in range(5):
-        folder.save(taught())
+        folder.save(trained())
     assert names(folder) == [LAST, *(f'paper-00000{number}.npz' for number in (3, 4, 5))]
     assert os.readlink(folder.folder / LAST) == 'paper-000005.npz'
     folder.close()
     again = reopened(folder.folder)
-    assert again.save(taught()).name == 'paper-000006.npz'
+    assert again.save(trained()).name == 'paper-000006.npz'
     again.close()
 
 
-def test_one_learner_never_drives_out_anothers(folder):
-    folder.save(taught(kind='gaze_line'))
+def test_one_learner_never_removes_checkpoints_of_another(folder):
+    folder.save(trained(kind='gaze_line'))
     for _ in range(4):
-        folder.save(taught(kind='paper'))
+        folder.save(trained(kind='paper'))
     assert 'gaze_line-000001.npz' in names(folder)
 
 
-def test_who_starts_anew_is_newer_than_who_knew_more(folder):
-    folder.save(taught(10))
+def test_a_learner_after_a_reset_is_newer_than_one_that_knew_more(folder):
+    folder.save(trained(10))
     path = folder.save(untrained())
-    heir = taught(10)
-    assert folder.resume_into(heir).path == path
-    assert heir.trials == 0
+    resumed = trained(10)
+    assert folder.resume_into(resumed).path == path
+    assert resumed.trials == 0
 
 
 def spoil_by_cutting(path: Path) -> None:
@@ -168,23 +168,23 @@ SPOILED = {
 
 @pytest.mark.parametrize(('spoil', 'sentence'), SPOILED.values(), ids=SPOILED)
 def test_what_cannot_be_used_is_refused_and_the_one_before_it_is_taken(folder, spoil, sentence):
-    good = taught(4)
+    good = trained(4)
     before = folder.save(good)
-    newest = folder.save(taught(5))
+    newest = folder.save(trained(5))
     spoil(newest)
-    heir = untrained(seed=9)
-    path, [refused] = folder.resume_into(heir)
+    resumed = untrained(seed=9)
+    path, [refused] = folder.resume_into(resumed)
     assert path == before
     assert str(newest) in refused
     assert sentence in refused
     assert '\n' not in refused
-    assert same(heir, good)
-    assert folder.save(heir).name == 'paper-000003.npz', 'what was refused is not written over'
+    assert same(resumed, good)
+    assert folder.save(resumed).name == 'paper-000003.npz', 'what was refused is not written over'
 
 
-def test_when_none_can_be_used_nobody_starts_untaught_unnoticed(folder):
+def test_when_none_can_be_used_no_learner_starts_from_initial_weights_unnoticed(folder):
     for _ in range(2):
-        spoil_by_cutting(folder.save(taught()))
+        spoil_by_cutting(folder.save(trained()))
     learner = untrained(seed=9)
     with pytest.raises(ConfigError, match=r'none of the 2 checkpoints .* newest: .*000002'):
         folder.resume_into(learner)
@@ -211,12 +211,12 @@ def test_a_file_system_without_links_will_do(folder, monkeypatch):
         raise PermissionError(1, 'Operation not permitted')
 
     monkeypatch.setattr(Path, 'symlink_to', no_links)
-    folder.save(taught())
+    folder.save(trained())
     assert names(folder) == ['paper-000001.npz']
 
 
 def test_a_full_disk_costs_nothing_that_was_saved(folder, monkeypatch):
-    good = taught()
+    good = trained()
     path = folder.save(good)
 
     def full(*_args, **_kwargs):
@@ -224,10 +224,10 @@ def test_a_full_disk_costs_nothing_that_was_saved(folder, monkeypatch):
 
     monkeypatch.setattr(np, 'savez', full)
     with pytest.raises(OSError, match='No space left'):
-        folder.save(taught(5))
-    heir = untrained(seed=9)
-    assert folder.resume_into(heir) == Resumed(path, [])
-    assert same(heir, good)
+        folder.save(trained(5))
+    resumed = untrained(seed=9)
+    assert folder.resume_into(resumed) == Resumed(path, [])
+    assert same(resumed, good)
 
 
 def test_it_is_saved_every_so_many_trials_and_at_the_end_if_need_be(tmp_path):
@@ -245,9 +245,9 @@ def test_it_is_saved_every_so_many_trials_and_at_the_end_if_need_be(tmp_path):
     folder.close()
 
 
-def test_who_goes_on_is_saved_when_so_many_more_were_learned(tmp_path):
+def test_a_resumed_learner_is_saved_when_so_many_more_were_learned(tmp_path):
     folder = reopened(tmp_path, checkpoint_every_trials=4)
-    folder.save(taught(6))
+    folder.save(trained(6))
     learner = untrained()
     folder.resume_into(learner)
     folder.save_when_changed(learner)

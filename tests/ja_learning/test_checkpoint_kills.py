@@ -16,7 +16,7 @@ from made_up_trials import trial
 KILLS = 50
 EVERY_TRIALS = 3
 CONFIG = CheckpointConfig(checkpoint_every_trials=EVERY_TRIALS, checkpoints_kept=2)
-LONGEST_LIFE_S = 0.6
+LONGEST_RUN_S = 0.6
 
 pytestmark = pytest.mark.slow
 
@@ -25,15 +25,15 @@ def untrained() -> GazeLineLearner:
     return GazeLineLearner(GazeLineConfig(replay_steps=1), seed=0)
 
 
-def live(folder: Path, tell: Connection) -> None:
-    """Take up what was learned; learn, save and tell the count of trials, until killed."""
+def learn_until_killed(folder: Path, counts: Connection) -> None:
+    """Resume; learn, save and send the count of trials, until killed."""
     learner = untrained()
     checkpoints = CheckpointFolder(folder, CONFIG)
     checkpoints.resume_into(learner)
-    tell.send(learner.trials)
+    counts.send(learner.trials)
     while True:
         learner.update(trial(learner.trials))
-        tell.send(learner.trials)
+        counts.send(learner.trials)
         checkpoints.save_when_due(learner)
 
 
@@ -44,32 +44,34 @@ def test_fifty_kills_cost_few_trials_each_and_nothing_else(tmp_path):
     processes.set_forkserver_preload(['ja_learning.core.gaze_line', 'made_up_trials'])
     saved, died_writing = 0, 0
     for _ in range(KILLS):
-        hear, tell = processes.Pipe(duplex=False)
-        life = processes.Process(target=live, args=(tmp_path, tell), daemon=True)
-        life.start()
-        tell.close()
-        assert hear.recv() == saved, 'it goes on from the newest checkpoint'
-        time.sleep(random.uniform(0.0, LONGEST_LIFE_S))
-        life.kill()
-        life.join()
-        lived = last_told(hear, saved)
+        received, counts = processes.Pipe(duplex=False)
+        process = processes.Process(
+            target=learn_until_killed, args=(tmp_path, counts), daemon=True
+        )
+        process.start()
+        counts.close()
+        assert received.recv() == saved, 'it goes on from the newest checkpoint'
+        time.sleep(random.uniform(0.0, LONGEST_RUN_S))
+        process.kill()
+        process.join()
+        learned = last_count(received, saved)
         died_writing += bool(list(tmp_path.glob('.*.npz.*')))
-        heir = untrained()
+        resumed = untrained()
         checkpoints = CheckpointFolder(tmp_path, CONFIG)
-        assert checkpoints.resume_into(heir).refused == [], 'every file that is there is whole'
+        assert checkpoints.resume_into(resumed).refused == [], 'every file that is there is whole'
         checkpoints.close()
-        assert heir.trials >= max(saved, lived - EVERY_TRIALS)
-        saved = heir.trials
+        assert resumed.trials >= max(saved, learned - EVERY_TRIALS)
+        saved = resumed.trials
     assert died_writing, 'no kill fell into the writing of a file: the test is too tame'
     assert saved > KILLS
-    assert_same_state(heir, uninterrupted(saved))
+    assert_same_state(resumed, uninterrupted(saved))
 
 
-def last_told(hear: Connection, count: int) -> int:
-    """The count of trials that was told last before the end."""
+def last_count(received: Connection, count: int) -> int:
+    """Return the count of trials that was sent last before the end."""
     try:
         while True:
-            count = hear.recv()
+            count = received.recv()
     except EOFError:
         return count
 
@@ -82,7 +84,7 @@ def uninterrupted(trials: int) -> GazeLineLearner:
 
 
 def assert_same_state(one: GazeLineLearner, other: GazeLineLearner) -> None:
-    ours, theirs = one.state(), other.state()
-    assert ours.keys() == theirs.keys()
+    ours, tresumeds = one.state(), other.state()
+    assert ours.keys() == tresumeds.keys()
     for name in ours:
-        np.testing.assert_array_equal(ours[name], theirs[name], err_msg=name)
+        np.testing.assert_array_equal(ours[name], tresumeds[name], err_msg=name)

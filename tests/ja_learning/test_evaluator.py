@@ -1,4 +1,4 @@
-"""The internal evaluator: Eq. 3 while the head stands still, and never which object was meant."""
+"""The internal evaluator: Eq. 3 while the head stands still, for whichever object is fixated."""
 
 import math
 
@@ -71,5 +71,5 @@ def test_a_glance_is_no_fixation():
     assert [seen(0.0), seen(0.1), seen(0.2), seen(0.3)] == [False, False, True, True]
     assert [seen(0.4, pan=0.5), seen(0.5, pan=0.5)] == [False, False], 'turned between two images'
     assert [seen(0.6, pan=0.5), seen(0.7, 0.5, (0.3, 0.0)), seen(0.8, 0.5)] == [True, False, False]
-    assert not seen(0.2, pan=0.5), 'the clock was set back: it begins anew'
+    assert not seen(0.2, pan=0.5), 'the clock was set back: it starts again'
     assert seen(0.4, pan=0.5)

@@ -1,4 +1,4 @@
-"""Evidence from shuffled faces: none by chance, much for who knows, and it falls again."""
+"""Evidence from shuffled faces: none by chance, much from knowledge, and it falls again."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ def face_of(number: int) -> np.ndarray:
 
 
 def weighed(evidence: Evidence, trials: int, log_p, seed: int = 0) -> list[float]:
-    """The evidence after each trial; `log_p(rng, n)`: what n faces say of what was seen."""
+    """Return the evidence after each trial; `log_p(rng, n)`: log p of what n faces explain."""
     rng = np.random.default_rng(seed)
     history = []
     for trial in range(trials):
@@ -46,7 +46,7 @@ def test_nothing_is_weighed_before_there_are_other_faces():
     assert weighed(Evidence(), 15, knowing) == [0.0] * 15
 
 
-def test_one_trial_in_which_none_was_meant_costs_little():
+def test_one_trial_without_an_attended_object_costs_little():
     evidence = Evidence()
     before = weighed(evidence, 40, knowing)[-1]
     evidence.weigh(face_of(0), lambda faces: np.array([[-1e6] + [0.0] * (len(faces) - 1)]))
@@ -91,6 +91,6 @@ def test_a_change_is_noticed_soon_and_no_bad_luck_is_taken_for_one():
     assert since == noticed - 100, 'it knows when the change was'
 
 
-def test_who_never_knew_anything_is_alarmed_by_nothing():
+def test_a_learner_that_never_knew_anything_raises_no_alarm():
     alarm = ChangeAlarm()
     assert not any(alarm.raised_by(-2.0, knew=False) for _ in range(100))

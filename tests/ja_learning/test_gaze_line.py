@@ -1,4 +1,4 @@
-"""The fast learner: its belief by numbers, and what it learns without being told."""
+"""The fast learner: its belief by numbers, and what it learns without labels."""
 
 import dataclasses
 
@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from ja_learning.core.gaze_line import GazeLineLearner
-from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_learning.core.gaze_line_belief import GazeLineBelief
+from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_learning.core.gaze_line_network import (
     ANGLE_SCALE_RAD,
     GazeLineNetwork,
@@ -23,37 +23,37 @@ LOOK = np.array([0.1, -0.05])
 
 
 def drawn_face(gaze: np.ndarray) -> np.ndarray:
-    """A grey face whose dark spot moves with the gaze (pan to the left, tilt down) [rad]."""
+    """Draw a grey face whose dark spot moves with the gaze (pan to the left, tilt down) [rad]."""
     rows, columns = np.mgrid[0:30, 0:25]
     column, row = 12 - 10 * gaze[0] / 0.7, 15 + 12 * gaze[1] / 0.3
     spot = np.exp(-((rows - row) ** 2 + (columns - column) ** 2) / 8)
     return (200 - 150 * spot).astype(np.uint8)
 
 
-def lived_trial(rng: np.random.Generator, objects: int = 4) -> tuple[Trial, int]:
-    """A trial among `objects`, one of which was meant; another may have been fixated."""
+def made_trial(rng: np.random.Generator, objects: int = 4) -> tuple[Trial, int]:
+    """Make a trial among `objects`: one is the attended object, another may be fixated."""
     places = rng.uniform([-0.6, -0.25], [0.6, 0.25], (objects, 2))
-    meant, fixated = rng.integers(objects, size=2)
+    attended, fixated = rng.integers(objects, size=2)
     return (
         Trial(
-            drawn_face(places[meant]),
+            drawn_face(places[attended]),
             LOOK,
             LOOK[None],
             LOOK + places[fixated],
             LOOK + places,
             objects,
         ),
-        int(meant),
+        int(attended),
     )
 
 
 def share_right(learner: GazeLineLearner, rng: np.random.Generator, trials: int = 100) -> float:
     right = 0
     for _ in range(trials):
-        trial, meant = lived_trial(rng)
+        trial, attended = made_trial(rng)
         delta = learner.propose(trial.face, LOOK, LOOK, trial.candidates)
         nearest = np.argmin(np.linalg.norm(trial.candidates - LOOK - delta, axis=1))
-        right += nearest == meant
+        right += nearest == attended
     return right / trials
 
 
@@ -97,7 +97,7 @@ def test_where_lines_begin_is_learned_by_members_that_have_cooled_alone(learner)
     # Members cool within 4, 11 and 32 trials with four objects.
     for trial, cooled in ((3, 0), (8, 1), (20, 2), (40, 3)):
         while learner.trials < trial:
-            learner.update(lived_trial(rng)[0])
+            learner.update(made_trial(rng)[0])
         moved = learner.state()['network.origin_tilt'][:, 0] != 0.0
         assert moved.tolist() == [member < cooled for member in range(3)]
 
@@ -106,7 +106,7 @@ def test_it_learns_from_where_the_face_is_not_from_where_the_head_points(learner
     other = GazeLineLearner(learner.config, seed=3)
     rng = np.random.default_rng(1)
     for _ in range(5):
-        trial, _ = lived_trial(rng)
+        trial, _ = made_trial(rng)
         learner.update(trial)
         other.update(dataclasses.replace(trial, postures=trial.postures + 0.03))
     same = [learner.state(), other.state()]
@@ -165,7 +165,7 @@ def test_the_compiled_pass_gives_the_gazes_of_the_network(members, channels):
     assert compiled(faces) == pytest.approx(gaze, abs=1e-6)
 
 
-def test_who_asks_reckons_as_who_learns():
+def test_the_belief_in_numpy_equals_the_network_in_torch():
     network = GazeLineNetwork(members=2, channels=4)
     rng = np.random.default_rng(0)
     faces = rng.integers(0, 256, (3, 30, 25)).astype(np.uint8)
@@ -184,14 +184,14 @@ def test_who_asks_reckons_as_who_learns():
 
 
 def test_weights_that_code_a_face_decay_and_the_numbers_of_the_belief_do_not():
-    def taught(weight_decay: float) -> dict[str, np.ndarray]:
+    def trained(weight_decay: float) -> dict[str, np.ndarray]:
         config = GazeLineConfig(members=2, channels=4, weight_decay=weight_decay)
         learner, rng = GazeLineLearner(config, seed=3), np.random.default_rng(1)
         for _ in range(5):
-            learner.update(lived_trial(rng)[0])
+            learner.update(made_trial(rng)[0])
         return learner.state()
 
-    freely, decaying = taught(0.0), taught(20.0)
+    freely, decaying = trained(0.0), trained(20.0)
     # 20 steps, each of which takes 6 % of every weight.
     for name in ('coder.0.weight', 'coder.4.weight', 'hidden_weights', 'gaze_weights'):
         name = f'network.{name}'
@@ -206,12 +206,12 @@ def test_ratios_are_to_the_mean_of_all_places_that_were_seen():
     gaze = torch.tensor([[[0.6, -0.3]], [[0.1, 0.5]]])
     random = torch.Generator().manual_seed(0)
     places = torch.randn(1, 1, 3, 2, generator=random) / 2
-    elsewhere = torch.randn(2, 7, 2, generator=random) / 2
+    negatives = torch.randn(2, 7, 2, generator=random) / 2
     places[0, 0, 2] = torch.nan
     with torch.no_grad():
-        ratio = network.log_ratio(gaze, places, elsewhere).exp()
-        of_others = network.log_ratio(gaze, elsewhere[:, None], places[:, 0, :2].expand(2, -1, -1))
-        same = network.log_ratio(gaze, elsewhere[:, None, :1], elsewhere[:, :1].expand(2, 5, 2))
+        ratio = network.log_ratio(gaze, places, negatives).exp()
+        of_others = network.log_ratio(gaze, negatives[:, None], places[:, 0, :2].expand(2, -1, -1))
+        same = network.log_ratio(gaze, negatives[:, None, :1], negatives[:, :1].expand(2, 5, 2))
     assert ratio.shape == (2, 1, 3)
     assert ratio[..., 2].tolist() == [[0.0], [0.0]], 'what is not there'
     mean = (ratio.sum(-1) + of_others.exp().sum(-1)) / 9
@@ -219,13 +219,13 @@ def test_ratios_are_to_the_mean_of_all_places_that_were_seen():
     assert same.flatten().tolist() == pytest.approx([0.0, 0.0], abs=1e-5), 'one place for all'
 
 
-def test_what_is_seen_in_every_trial_is_not_taken_for_what_she_means(learner):
-    """Told by likelihood alone it was, in one trial of seven: it explains all faces."""
+def test_what_is_seen_in_every_trial_is_not_taken_for_the_gaze_target(learner):
+    """With the likelihood alone it was, in one trial of seven: it explains all faces."""
     rng = np.random.default_rng(0)
     lamp = LOOK + np.array([0.3, -0.2])
 
     def beside_a_lamp() -> Trial:
-        trial, _ = lived_trial(rng)
+        trial, _ = made_trial(rng)
         seen = np.concatenate([trial.candidates, [lamp]])
         return dataclasses.replace(trial, candidates=seen, seen_before_shift=len(seen))
 
@@ -240,11 +240,11 @@ def test_what_is_seen_in_every_trial_is_not_taken_for_what_she_means(learner):
     assert learner.log_evidence > 20
 
 
-def test_it_learns_which_object_was_meant_though_nobody_tells(learner):
+def test_it_learns_which_object_is_attended_without_labels(learner):
     rng = np.random.default_rng(0)
     before = share_right(learner, rng)
     for _ in range(100):
-        learner.update(lived_trial(rng)[0])
+        learner.update(made_trial(rng)[0])
     assert before < 0.5
     assert share_right(learner, rng) > 0.85
     assert learner.log_evidence > 20
@@ -254,30 +254,30 @@ def test_faces_that_tell_nothing_give_no_evidence(learner):
     rng = np.random.default_rng(6)
     highest = 0.0
     for _ in range(70):
-        trial, _ = lived_trial(rng)
-        other, _ = lived_trial(rng)
+        trial, _ = made_trial(rng)
+        other, _ = made_trial(rng)
         learner.update(dataclasses.replace(trial, face=other.face))
         highest = max(highest, learner.log_evidence)
     assert learner.trials == 70
     assert highest < np.log(20)
 
 
-def test_when_the_world_is_mirrored_it_is_learned_anew(learner):
+def test_when_the_world_is_mirrored_it_learns_again(learner):
     rng = np.random.default_rng(8)
 
-    def live(trials, mirrored):
+    def learn(trials, mirrored):
         for _ in range(trials):
-            trial, _ = lived_trial(rng)
+            trial, _ = made_trial(rng)
             face = trial.face[:, ::-1] if mirrored else trial.face
             learner.update(dataclasses.replace(trial, face=np.ascontiguousarray(face)))
 
-    live(60, mirrored=False)
+    learn(60, mirrored=False)
     knew = learner.log_evidence
-    live(30, mirrored=True)
+    learn(30, mirrored=True)
     assert learner.log_evidence < knew / 2, 'what it knew is wrong now, and it says so'
-    live(70, mirrored=True)
+    learn(70, mirrored=True)
     assert learner.log_evidence > 20
-    assert len(learner.state()['faces']) < 120, 'what was lived before the change is forgotten'
+    assert len(learner.state()['faces']) < 120, 'the trials before the change are forgotten'
 
 
 def test_a_snapshot_stays_as_it_was_while_the_learner_goes_on(learner):
@@ -287,7 +287,7 @@ def test_a_snapshot_stays_as_it_was_while_the_learner_goes_on(learner):
     before = snapshot.log_density(face[None], LOOK, places)
     assert np.array_equal(before, learner.snapshot().log_density(face[None], LOOK, places))
     for _ in range(20):
-        learner.update(lived_trial(rng)[0])
+        learner.update(made_trial(rng)[0])
     assert np.array_equal(before, snapshot.log_density(face[None], LOOK, places))
     assert not np.allclose(before, learner.snapshot().log_density(face[None], LOOK, places))
 
@@ -302,12 +302,12 @@ def test_without_top_down_attention_the_best_guess_is_proposed_whatever_stands_t
 
 
 def test_what_was_fixated_changes_nothing():
-    """Neither right nor wrong reaches it: all that was seen counts alike."""
+    """It does not use the fixation: all that was seen counts alike."""
     learners = [GazeLineLearner(GazeLineConfig(members=3, channels=4), seed=1) for _ in range(2)]
     rng = np.random.default_rng(1)
     for _ in range(5):
-        trial, meant = lived_trial(rng)
-        for learner, fixated in zip(learners, (meant, (meant + 1) % 4), strict=True):
+        trial, attended = made_trial(rng)
+        for learner, fixated in zip(learners, (attended, (attended + 1) % 4), strict=True):
             fixation = trial.candidates[fixated]
             learner.update(dataclasses.replace(trial, fixation=fixation, seen_before_shift=0))
     one, other = (learner.state() for learner in learners)
@@ -323,7 +323,7 @@ def test_a_plausible_object_is_proposed_exactly_else_the_best_guess(learner):
     assert learner.propose(face, LOOK, here, [far]) == pytest.approx(LOOK + guess - here)
 
 
-def test_a_trial_in_which_nothing_was_seen_teaches_nothing(learner):
+def test_a_trial_in_which_nothing_was_seen_changes_nothing(learner):
     before = learner.state()
     learner.update(Trial(drawn_face(np.zeros(2)), LOOK, LOOK[None], LOOK))
     after = learner.state()
@@ -335,11 +335,11 @@ def test_a_restored_learner_goes_on_bit_for_bit(learner):
     rng = np.random.default_rng(2)
     # After fifteen trials it weighs, too.
     for _ in range(20):
-        learner.update(lived_trial(rng)[0])
+        learner.update(made_trial(rng)[0])
     again = GazeLineLearner(GazeLineConfig(members=3, channels=4), seed=99)
     again.restore(learner.state())
     for _ in range(3):
-        trial, _ = lived_trial(rng)
+        trial, _ = made_trial(rng)
         learner.update(trial)
         again.update(trial)
     one, other = learner.state(), again.state()
@@ -359,7 +359,7 @@ def test_a_restored_learner_goes_on_bit_for_bit(learner):
 )
 def test_another_learners_state_is_refused_and_changes_nothing(learner, spoil, why):
     rng = np.random.default_rng(4)
-    learner.update(lived_trial(rng)[0])
+    learner.update(made_trial(rng)[0])
     before, spoilt = learner.state(), learner.state()
     spoil(spoilt)
     with pytest.raises(ValueError, match=why):

@@ -64,5 +64,5 @@ def test_a_learner_takes_its_own_configuration_only():
 
 
 def test_an_unknown_learner_is_refused_with_the_names_of_those_there_are():
-    with pytest.raises(ConfigError, match="'teacher' is not a learner: .* paper, gaze_line"):
+    with pytest.raises(ConfigError, match=r"'teacher' is not a learner: .* paper, gaze_line"):
         make_learner('teacher', 0)

@@ -23,10 +23,10 @@ from ja_common.topics import (
     JOINT_STATES,
     LM_DELTA,
 )
-from ja_learning.core.trial_pipeline import BELIEF_SAMPLES
 from ja_learning.core.network import ThreeLayerNetwork
 from ja_learning.core.network_config import NetworkConfig
 from ja_learning.core.trial import Trial
+from ja_learning.core.trial_pipeline import BELIEF_SAMPLES
 from ja_learning.learning_module_node import LearningModuleNode
 from node_bench import header, joint_state
 
@@ -35,38 +35,38 @@ ATTENDED = Detection(Kind.FACE, 0.0, 0.0, 0, 0, 40, 48, 1.0, attended=True)
 BALL = Detection(Kind.OBJECT, -0.2, 0.1, 0, 0, 10, 10, 1.0)
 PASSING = Detection(Kind.FACE, 0.1, 0.0, 0, 0, 40, 48, 1.0)
 FACE = np.random.default_rng(0).integers(0, 256, (30, 25)).astype(np.uint8)
-SAYS = [DETECTIONS, FACE_IMAGE, FIXATION, JOINT_STATES]
+PUBLISHED = [DETECTIONS, FACE_IMAGE, FIXATION, JOINT_STATES]
 
 
-class TrialLoop:
-    """What the learner lives through, image after image; it answers each."""
+class NodeTrials:
+    """Sends the node the images of trials, one after the other; the node answers each."""
 
     def __init__(self, bench):
         self.bench = bench
         self.ms = 0
 
-    def look(self, face=FACE, pan=0.0):
+    def send_look(self, face=FACE, pan=0.0):
         stamp_ns = self._tick(pan)
         self.bench.publish(FACE_IMAGE, encode_image(face, header(stamp_ns).stamp, 'eye'))
-        return self._see(stamp_ns, [ATTENDED])
+        return self._send_image(stamp_ns, [ATTENDED])
 
-    def rest(self, pan, detections=()):
-        return self._see(self._tick(pan), list(detections))
+    def send_rest(self, pan, detections=()):
+        return self._send_image(self._tick(pan), list(detections))
 
-    def pass_by(self, pan):
-        return self._see(self._tick(pan, velocity=[0.5, 0.0]), [])
+    def send_motion(self, pan):
+        return self._send_image(self._tick(pan, velocity=[0.5, 0.0]), [])
 
-    def fixate(self, pan, direction):
-        """Ends the trial, and waits until it is learned."""
-        self._see(self._tick(pan), [], direction)
+    def send_fixation(self, pan, direction):
+        """End the trial, and wait until it is learned."""
+        self._send_image(self._tick(pan), [], direction)
         while self.bench.node.health.values['of these still waiting'] != '0':
-            self.rest(pan)
+            self.send_rest(pan)
 
-    def trial(self, direction=(0.4, 0.1)):
-        """A whole trial: look, one shift, fixation."""
-        self.look()
+    def send_trial(self, direction=(0.4, 0.1)):
+        """Send a whole trial: look, one shift, fixation."""
+        self.send_look()
         before = self.learned
-        self.fixate(0.3, direction)
+        self.send_fixation(0.3, direction)
         assert self.learned == before + 1
 
     @property
@@ -78,137 +78,139 @@ class TrialLoop:
         self.bench.publish_posture(self.ms * MS, pan, **more)
         return self.ms * MS
 
-    def _see(self, stamp_ns, detections, fixation=()):
+    def _send_image(self, stamp_ns, detections, fixation=()):
         self.bench.publish(DETECTIONS, encode_detections(header(stamp_ns), detections))
         answer = self.bench.next(LM_DELTA)
         assert answer.header == header(stamp_ns)
-        self._say_fixation(stamp_ns, fixation)
+        self._publish_fixation(stamp_ns, fixation)
         return answer
 
-    def _say_fixation(self, stamp_ns, direction):
+    def _publish_fixation(self, stamp_ns, direction):
         before = self.bench.received(FIXATION)
         self.bench.publish(FIXATION, joint_state(stamp_ns, *direction))
         self.bench.wait(lambda: self.bench.received(FIXATION) > before)
 
 
 @pytest.fixture
-def make_life(make_bench):
+def make_trials(make_bench):
     def make(**parameters):
-        hears = [LM_DELTA, GLANCE_DELTA, EVIDENCE]
-        return TrialLoop(make_bench(LearningModuleNode, SAYS, hears, **parameters))
+        subscribes = [LM_DELTA, GLANCE_DELTA, EVIDENCE]
+        return NodeTrials(make_bench(LearningModuleNode, PUBLISHED, subscribes, **parameters))
 
     return make
 
 
 @pytest.fixture
-def life(make_life):
-    return make_life()
+def trials(make_trials):
+    return make_trials()
 
 
-def test_proposal_is_the_networks_at_the_posture_of_every_image_of_a_trial(life):
+def test_proposal_is_the_networks_at_the_posture_of_every_image_of_a_trial(trials):
     network = ThreeLayerNetwork(NetworkConfig(), seed=0)
-    assert list(life.look().position) == pytest.approx(network.predict(FACE, (0, 0)))
-    assert list(life.rest(0.3).position) == pytest.approx(network.predict(FACE, (0.3, 0)))
+    assert list(trials.send_look().position) == pytest.approx(network.predict(FACE, (0, 0)))
+    assert list(trials.send_rest(0.3).position) == pytest.approx(network.predict(FACE, (0.3, 0)))
 
 
-def test_nothing_is_proposed_before_a_look_and_after_the_fixation(life):
-    assert not life.rest(0.0).name
-    assert not life.rest(0.0, [PASSING]).name, 'a face that is not attended is no look'
-    life.trial()
-    assert not life.rest(0.3).name
+def test_nothing_is_proposed_before_a_look_and_after_the_fixation(trials):
+    assert not trials.send_rest(0.0).name
+    assert not trials.send_rest(0.0, [PASSING]).name, 'a face that is not attended is no look'
+    trials.send_trial()
+    assert not trials.send_rest(0.3).name
 
 
-def test_face_image_may_come_after_its_detections(life):
-    stamp_ns = life._tick(0.0)
-    life.bench.publish(DETECTIONS, encode_detections(header(stamp_ns), [ATTENDED]))
-    life.bench.publish(FACE_IMAGE, encode_image(FACE, header(stamp_ns).stamp, 'eye'))
-    assert life.bench.next(LM_DELTA).name
+def test_face_image_may_come_after_its_detections(trials):
+    stamp_ns = trials._tick(0.0)
+    trials.bench.publish(DETECTIONS, encode_detections(header(stamp_ns), [ATTENDED]))
+    trials.bench.publish(FACE_IMAGE, encode_image(FACE, header(stamp_ns).stamp, 'eye'))
+    assert trials.bench.next(LM_DELTA).name
 
 
-def test_fixation_teaches_the_trial_once(life):
-    life.look()
-    before = list(life.rest(0.0).position)
-    life.look()
-    life.fixate(0.3, (0.4, 0.1))
-    life.fixate(0.3, (0.4, 0.1))
-    assert life.learned == 1
-    assert list(life.look().position) != before
-    life.fixate(0.0, (0.4, 0.1))  # still where the look was: nothing was shifted
-    assert life.learned == 1
+def test_a_fixation_ends_the_trial_which_is_learned_once(trials):
+    trials.send_look()
+    before = list(trials.send_rest(0.0).position)
+    trials.send_look()
+    trials.send_fixation(0.3, (0.4, 0.1))
+    trials.send_fixation(0.3, (0.4, 0.1))
+    assert trials.learned == 1
+    assert list(trials.send_look().position) != before
+    trials.send_fixation(0.0, (0.4, 0.1))  # still where the look was: nothing was shifted
+    assert trials.learned == 1
 
 
-def test_postures_at_rest_are_taught_and_those_passed_on_the_way_are_not(life):
-    life.look()
-    life.pass_by(0.1)
-    life.rest(0.2)
-    life.pass_by(0.25)
-    life.fixate(0.3, (0.4, 0.1))
+def test_postures_at_rest_are_learned_and_those_passed_on_the_way_are_not(trials):
+    trials.send_look()
+    trials.send_motion(0.1)
+    trials.send_rest(0.2)
+    trials.send_motion(0.25)
+    trials.send_fixation(0.3, (0.4, 0.1))
     network = ThreeLayerNetwork(NetworkConfig(), seed=0)
     network.update(
         Trial(FACE, np.zeros(2), np.array([(0.0, 0.0), (0.2, 0.0)]), np.array((0.4, 0.1)))
     )
-    assert list(life.look().position) == pytest.approx(network.predict(FACE, (0, 0)), abs=1e-7)
+    assert list(trials.send_look().position) == pytest.approx(
+        network.predict(FACE, (0, 0)), abs=1e-7
+    )
 
 
-def test_learning_moves_the_proposal_towards_the_fixation(make_life):
-    life = make_life(learning_rate=0.01)
+def test_learning_moves_the_proposal_towards_the_fixation(make_trials):
+    trials = make_trials(learning_rate=0.01)
     target = np.array([0.4, 0.1])
 
     def distance():
-        return np.linalg.norm(np.subtract(life.look().position, target))
+        return np.linalg.norm(np.subtract(trials.send_look().position, target))
 
     before = distance()
     for _ in range(10):
-        life.trial(target)
+        trials.send_trial(target)
     assert distance() < 0.8 * before
 
 
-def test_in_lockstep_it_answers_with_what_it_knew_a_trial_ago(make_life):
-    life = make_life(lockstep=True)
+def test_in_lockstep_it_answers_with_what_it_knew_a_trial_ago(make_trials):
+    trials = make_trials(lockstep=True)
     network = ThreeLayerNetwork(NetworkConfig(), seed=0)
     for _ in range(3):
-        assert list(life.look().position) == pytest.approx(network.predict(FACE, (0, 0)))
-        life.fixate(0.3, (0.4, 0.1))
-        if life.learned > 1:
+        assert list(trials.send_look().position) == pytest.approx(network.predict(FACE, (0, 0)))
+        trials.send_fixation(0.3, (0.4, 0.1))
+        if trials.learned > 1:
             network.update(Trial(FACE, np.zeros(2), np.array([(0.0, 0.0)]), np.array((0.4, 0.1))))
 
 
-def test_disabled_learning_still_proposes(life):
-    assert life.bench.call(SetBool, 'learning_enabled', data=False).success
-    before = list(life.look().position)
-    life.fixate(0.3, (0.4, 0.1))
-    assert list(life.look().position) == before
-    assert life.learned == 0
-    life.bench.call(SetBool, 'learning_enabled', data=True)
-    life.trial()
+def test_disabled_learning_still_proposes(trials):
+    assert trials.bench.call(SetBool, 'learning_enabled', data=False).success
+    before = list(trials.send_look().position)
+    trials.send_fixation(0.3, (0.4, 0.1))
+    assert list(trials.send_look().position) == before
+    assert trials.learned == 0
+    trials.bench.call(SetBool, 'learning_enabled', data=True)
+    trials.send_trial()
 
 
-def test_reset_forgets_everything(life):
-    untrained = list(life.look().position)
-    life.trial()
-    assert list(life.look().position) != untrained
-    assert life.bench.call(Trigger, 'reset_learning').success
-    assert not life.rest(0.0).name, 'the trial under way too'
-    assert list(life.look().position) == untrained
+def test_reset_forgets_everything(trials):
+    untrained = list(trials.send_look().position)
+    trials.send_trial()
+    assert list(trials.send_look().position) != untrained
+    assert trials.bench.call(Trigger, 'reset_learning').success
+    assert not trials.send_rest(0.0).name, 'the trial under way too'
+    assert list(trials.send_look().position) == untrained
 
 
-def test_what_was_learned_is_taken_up_by_the_next_process(make_life, tmp_path):
+def test_the_next_process_continues_with_what_was_learned(make_trials, tmp_path):
     kept = {'checkpoint_folder': str(tmp_path / 'a folder')}
-    first = make_life(**kept)
-    first.trial()
-    taught = list(first.look().position)
+    first = make_trials(**kept)
+    first.send_trial()
+    learned = list(first.send_look().position)
     first.bench.close()
     [path] = (tmp_path / 'a folder').glob('paper-*.npz')
 
-    second = make_life(**kept, seed=5)
+    second = make_trials(**kept, seed=5)
     assert second.learned == 1
-    assert list(second.look().position) == taught
+    assert list(second.send_look().position) == learned
     second.bench.close()
     assert [path] == list(path.parent.glob('paper-*.npz')), 'nothing new was learned'
 
-    third = make_life(**kept, seed=5, resume=False)
+    third = make_trials(**kept, seed=5, resume=False)
     assert third.learned == 0
-    assert list(third.look().position) != taught
+    assert list(third.send_look().position) != learned
 
 
 def test_heads_side_by_side_keep_what_they_learned_apart(ros_context, tmp_path):
@@ -222,71 +224,71 @@ def test_heads_side_by_side_keep_what_they_learned_apart(ros_context, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ['left', 'right']
 
 
-def test_a_learner_is_saved_and_loaded_on_demand(make_life, tmp_path):
-    life = make_life(checkpoint_folder=str(tmp_path))
-    nothing = life.bench.call(Trigger, 'load_checkpoint')
+def test_a_learner_is_saved_and_loaded_on_demand(make_trials, tmp_path):
+    trials = make_trials(checkpoint_folder=str(tmp_path))
+    nothing = trials.bench.call(Trigger, 'load_checkpoint')
     assert not nothing.success
     assert nothing.message == f'no checkpoint in {tmp_path}'
-    life.trial()
+    trials.send_trial()
     path = tmp_path / 'paper-000001.npz'
-    assert life.bench.call(Trigger, 'save_checkpoint').message == f'1 trials saved to {path}'
-    taught = list(life.look().position)
-    life.rest(0.0)
-    life.trial()
-    assert list(life.look().position) != taught
-    assert life.bench.call(Trigger, 'load_checkpoint').message == f'1 trials loaded from {path}'
-    assert list(life.look().position) == taught
+    assert trials.bench.call(Trigger, 'save_checkpoint').message == f'1 trials saved to {path}'
+    learned = list(trials.send_look().position)
+    trials.send_rest(0.0)
+    trials.send_trial()
+    assert list(trials.send_look().position) != learned
+    assert trials.bench.call(Trigger, 'load_checkpoint').message == f'1 trials loaded from {path}'
+    assert list(trials.send_look().position) == learned
 
 
-def test_it_is_saved_every_so_many_trials(make_life, tmp_path):
-    life = make_life(checkpoint_folder=str(tmp_path), checkpoint_every_trials=2)
+def test_it_is_saved_every_so_many_trials(make_trials, tmp_path):
+    trials = make_trials(checkpoint_folder=str(tmp_path), checkpoint_every_trials=2)
     for expected in ([], [1], [1], [1, 2]):
-        life.trial()
+        trials.send_trial()
         saved = sorted(tmp_path.glob('paper-*.npz'))
         assert saved == [tmp_path / f'paper-{number:06d}.npz' for number in expected]
 
 
-def test_what_is_forgotten_stays_forgotten(make_life, tmp_path):
-    first = make_life(checkpoint_folder=str(tmp_path), checkpoint_every_trials=1)
-    untrained = list(first.look().position)
-    first.trial()
+def test_what_is_forgotten_stays_forgotten(make_trials, tmp_path):
+    first = make_trials(checkpoint_folder=str(tmp_path), checkpoint_every_trials=1)
+    untrained = list(first.send_look().position)
+    first.send_trial()
     assert first.bench.call(Trigger, 'reset_learning').success
     first.bench.close()
-    second = make_life(checkpoint_folder=str(tmp_path), seed=5)
-    assert list(second.look().position) == untrained
+    second = make_trials(checkpoint_folder=str(tmp_path), seed=5)
+    assert list(second.send_look().position) == untrained
 
 
-def test_a_damaged_checkpoint_is_told_and_the_one_before_it_is_used(make_life, tmp_path):
-    first = make_life(checkpoint_folder=str(tmp_path), checkpoint_every_trials=1)
-    first.trial()
-    first.trial()
+def test_a_damaged_checkpoint_is_reported_and_the_one_before_it_is_used(make_trials, tmp_path):
+    first = make_trials(checkpoint_folder=str(tmp_path), checkpoint_every_trials=1)
+    first.send_trial()
+    first.send_trial()
     first.bench.close()
     newest = tmp_path / 'paper-000002.npz'
     newest.write_bytes(newest.read_bytes()[:-100])
-    second = make_life(checkpoint_folder=str(tmp_path))
+    second = make_trials(checkpoint_folder=str(tmp_path))
     assert second.learned == 1
     assert f'refused: {newest} is not a checkpoint' in second.bench.complaint()
-    second.trial()
+    second.send_trial()
 
 
-def test_no_untaught_learner_starts_where_only_others_have_learned(make_life, tmp_path):
-    first = make_life(checkpoint_folder=str(tmp_path), hidden=3)
-    first.trial()
+def test_no_untrained_learner_starts_where_only_others_have_learned(make_trials, tmp_path):
+    first = make_trials(checkpoint_folder=str(tmp_path), hidden=3)
+    first.send_trial()
     first.bench.close()
     with pytest.raises(ConfigError, match='was made with hidden = 3, here it is 7'):
-        make_life(checkpoint_folder=str(tmp_path))
+        make_trials(checkpoint_folder=str(tmp_path))
 
 
-def test_without_a_place_saving_and_loading_say_so(life):
+def test_without_a_place_saving_and_loading_say_so(trials):
     for service in ('save_checkpoint', 'load_checkpoint'):
-        response = life.bench.call(Trigger, service)
+        response = trials.bench.call(Trigger, service)
         assert not response.success
         assert 'checkpoint_folder is empty' in response.message
 
 
 @pytest.fixture
 def full_disk(monkeypatch):
-    """A context in which nothing can be written."""
+    """Return a context in which nothing can be written."""
 
     @contextmanager
     def full():
@@ -300,24 +302,24 @@ def full_disk(monkeypatch):
     return full
 
 
-def test_a_checkpoint_that_cannot_be_written_is_told_and_learning_goes_on(
-    make_life, tmp_path, full_disk
+def test_a_checkpoint_that_cannot_be_written_is_reported_and_learning_goes_on(
+    make_trials, tmp_path, full_disk
 ):
-    life = make_life(checkpoint_folder=str(tmp_path), checkpoint_every_trials=1)
+    trials = make_trials(checkpoint_folder=str(tmp_path), checkpoint_every_trials=1)
     with full_disk():
-        life.trial()
-        life.look()
-        life.bench.wait_for_complaint('learning: [Errno 28] No space left on device')
-    life.trial()
+        trials.send_trial()
+        trials.send_look()
+        trials.bench.wait_for_complaint('learning: [Errno 28] No space left on device')
+    trials.send_trial()
     assert list(tmp_path.glob('paper-*.npz'))
 
 
-def test_what_cannot_be_forgotten_for_good_is_told(make_life, tmp_path, full_disk):
-    life = make_life(checkpoint_folder=str(tmp_path))
+def test_what_cannot_be_forgotten_for_good_is_reported(make_trials, tmp_path, full_disk):
+    trials = make_trials(checkpoint_folder=str(tmp_path))
     with full_disk():
-        assert life.bench.set_parameter('learner', 'gaze_line').successful
-        assert 'a restart would bring back what was forgotten' in life.bench.complaint()
-    assert life.look().name
+        assert trials.bench.set_parameter('learner', 'gaze_line').successful
+        assert 'a restart would bring back what was forgotten' in trials.bench.complaint()
+    assert trials.send_look().name
 
 
 @pytest.mark.parametrize(
@@ -328,32 +330,32 @@ def test_what_cannot_be_forgotten_for_good_is_told(make_life, tmp_path, full_dis
         ({'data': b''}, '0 bytes of data'),
     ],
 )
-def test_broken_face_image_is_one_clear_error_and_the_node_lives_on(life, spoil, text):
-    stamp_ns = life._tick(0.0)
+def test_broken_face_image_is_one_clear_error_and_the_node_goes_on(trials, spoil, text):
+    stamp_ns = trials._tick(0.0)
     message = encode_image(FACE, header(stamp_ns).stamp, 'eye')
     for name, value in spoil.items():
         setattr(message, name, value)
-    life.bench.publish(DETECTIONS, encode_detections(header(stamp_ns), [ATTENDED]))
-    life.bench.publish(FACE_IMAGE, message)
-    life.bench.wait_for_complaint(text)
-    assert '/face_image: ' in life.bench.complaint()
-    life.trial()
+    trials.bench.publish(DETECTIONS, encode_detections(header(stamp_ns), [ATTENDED]))
+    trials.bench.publish(FACE_IMAGE, message)
+    trials.bench.wait_for_complaint(text)
+    assert '/face_image: ' in trials.bench.complaint()
+    trials.send_trial()
 
 
-def test_broken_fixation_is_one_clear_error_and_the_node_lives_on(life):
-    life.look()
-    life.bench.publish(FIXATION, joint_state(life.ms * MS, float('nan'), 0.0))
-    life.bench.wait_for_complaint('/fixation: position of')
-    life.trial()
+def test_broken_fixation_is_one_clear_error_and_the_node_goes_on(trials):
+    trials.send_look()
+    trials.bench.publish(FIXATION, joint_state(trials.ms * MS, float('nan'), 0.0))
+    trials.bench.wait_for_complaint('/fixation: position of')
+    trials.send_trial()
 
 
 def test_another_learner_may_be_chosen_while_the_node_runs(make_bench):
-    bench = make_bench(LearningModuleNode, publishes=SAYS, subscribes=[LM_DELTA])
-    life = TrialLoop(bench)
-    life.trial()
+    bench = make_bench(LearningModuleNode, publishes=PUBLISHED, subscribes=[LM_DELTA])
+    trials = NodeTrials(bench)
+    trials.send_trial()
     assert bench.set_parameter('learner', 'gaze_line').successful
-    life.look()
-    delta = life.rest(0.0, [BALL])
+    trials.send_look()
+    delta = trials.send_rest(0.0, [BALL])
     assert delta.name
     refused = bench.set_parameter('learner', 'teacher')
     assert not refused.successful
@@ -361,30 +363,30 @@ def test_another_learner_may_be_chosen_while_the_node_runs(make_bench):
 
 
 @pytest.mark.parametrize('learner', ['paper', 'gaze_line'])
-def test_the_belief_is_told_to_who_looks(make_bench, learner):
-    bench = make_bench(LearningModuleNode, SAYS, [LM_DELTA, BELIEF], learner=learner)
-    life = TrialLoop(bench)
-    life.rest(0.0)
-    life.look(pan=0.1)
+def test_the_belief_is_published_to_its_subscribers(make_bench, learner):
+    bench = make_bench(LearningModuleNode, PUBLISHED, [LM_DELTA, BELIEF], learner=learner)
+    trials = NodeTrials(bench)
+    trials.send_rest(0.0)
+    trials.send_look(pan=0.1)
     bench.wait(lambda: len(bench.messages(BELIEF)) == 2)
     before, looking = bench.messages(BELIEF)
     assert before.width == 0, 'no trial is under way'
-    told = decode_columns(looking, ('pan', 'tilt', 'weight'))
-    assert len(told['pan']) == BELIEF_SAMPLES
-    assert told['weight'].sum() == pytest.approx(1.0, abs=1e-5)
-    assert np.mean(told['pan']) == pytest.approx(0.1, abs=0.1), 'an untrained belief is about her'
+    published = decode_columns(looking, ('pan', 'tilt', 'weight'))
+    assert len(published['pan']) == BELIEF_SAMPLES
+    assert published['weight'].sum() == pytest.approx(1.0, abs=1e-5)
+    assert np.mean(published['pan']) == pytest.approx(0.1, abs=0.1), 'untrained, about her'
 
 
-def test_glances_are_asked_for_until_both_sides_were_seen(make_life):
-    life = make_life(learner='gaze_line', look_around='both_sides', glance_pan_rad=0.4)
+def test_glances_are_asked_for_until_both_sides_were_seen(make_trials):
+    trials = make_trials(learner='gaze_line', look_around='both_sides', glance_pan_rad=0.4)
 
     def glance_at(pan):
         if pan is None:
-            life.look()
+            trials.send_look()
         else:
-            life.rest(pan)
-        life.bench.wait(lambda: len(life.bench.messages(GLANCE_DELTA)) == life.ms // 100)
-        return list(life.bench.messages(GLANCE_DELTA)[-1].position)
+            trials.send_rest(pan)
+        trials.bench.wait(lambda: len(trials.bench.messages(GLANCE_DELTA)) == trials.ms // 100)
+        return list(trials.bench.messages(GLANCE_DELTA)[-1].position)
 
     assert glance_at(None) == pytest.approx([0.4, 0.0])
     assert glance_at(0.4) == pytest.approx([-0.8, 0.0])
@@ -392,33 +394,34 @@ def test_glances_are_asked_for_until_both_sides_were_seen(make_life):
     assert glance_at(0.1) == [], 'and none after the shift'
 
 
-def test_evidence_is_told_with_every_image_of_the_learner(make_life):
-    life = make_life(learner='gaze_line')
-    life.look()
-    life.rest(0.2)
-    life.bench.wait(lambda: len(life.bench.messages(EVIDENCE)) == 2)
-    stamps = [message.header for message in life.bench.messages(EVIDENCE)]
+def test_evidence_is_published_with_every_image(make_trials):
+    trials = make_trials(learner='gaze_line')
+    trials.send_look()
+    trials.send_rest(0.2)
+    trials.bench.wait(lambda: len(trials.bench.messages(EVIDENCE)) == 2)
+    stamps = [message.header for message in trials.bench.messages(EVIDENCE)]
     assert stamps == [header(100 * MS), header(200 * MS)]
-    told = [
-        decode_columns(m, ['log_evidence'])['log_evidence'] for m in life.bench.messages(EVIDENCE)
+    published = [
+        decode_columns(m, ['log_evidence'])['log_evidence']
+        for m in trials.bench.messages(EVIDENCE)
     ]
-    assert told == [[0.0], [0.0]], 'nothing is known yet'
+    assert published == [[0.0], [0.0]], 'nothing is known yet'
 
 
-def test_a_trial_that_was_given_up_is_learned_by_who_needs_no_fixation(make_life):
-    life = make_life(learner='gaze_line')
-    life.look()
-    life.rest(0.3, [BALL])
-    life.look()
-    life.bench.wait(lambda: life.learned == 1)
+def test_a_trial_that_was_given_up_is_learned_by_a_learner_that_needs_no_fixation(make_trials):
+    trials = make_trials(learner='gaze_line')
+    trials.send_look()
+    trials.send_rest(0.3, [BALL])
+    trials.send_look()
+    trials.bench.wait(lambda: trials.learned == 1)
 
 
-def test_who_may_not_answer_before_all_else_says_so_and_answers(make_life, monkeypatch):
+def test_without_the_right_to_a_realtime_priority_it_says_so_and_answers(make_trials, monkeypatch):
     def refuse(*_):
         raise PermissionError(1, 'Operation not permitted')
 
     monkeypatch.setattr(os, 'sched_setscheduler', refuse)
-    life = make_life(realtime_priority=5)
-    said = life.bench.node.health.values['real-time priority']
-    assert said.startswith('none: real-time priority 5 is not allowed to this user: be root')
-    assert life.look().name
+    trials = make_trials(realtime_priority=5)
+    granted = trials.bench.node.health.values['real-time priority']
+    assert granted.startswith('none: real-time priority 5 is not allowed to this user: be root')
+    assert trials.send_look().name

@@ -26,7 +26,7 @@ def believing(share_left: float, share_right: float, samples: int = 100):
 
 
 def never():
-    raise AssertionError('nobody needs to be asked')
+    raise AssertionError('the belief is not needed')
 
 
 def test_off_there_are_no_glances():
@@ -52,7 +52,7 @@ def test_the_side_that_may_well_show_it_is_worth_a_glance(left, right, wanted):
     assert found is wanted if wanted is None else found == pytest.approx(wanted)
 
 
-def test_who_knows_nothing_looks_everywhere_and_so_may_take_it_for_evidence():
+def test_a_learner_that_knows_nothing_looks_everywhere_and_so_gets_evidence():
     views = around('where_worthwhile')
     views.start_trial(LOOK, log_evidence=0.0)
     assert views.next_view(never) == pytest.approx(LEFT)
@@ -66,7 +66,7 @@ def test_what_has_been_in_view_is_not_looked_for_again():
     assert views.next_view(believing(0.9, 0.05)) is None
 
 
-def test_after_the_shift_nobody_glances():
+def test_after_the_shift_there_are_no_glances():
     views = around('both_sides')
     assert not views.observe_rest((0.3, 0.05))
     assert views.next_view(never) is None

@@ -17,7 +17,7 @@ def make_trial(postures=((0.1, -0.05),), fixation=(0.5, 0.2), face=FACE):
 
 
 def output(state, face, posture):
-    """The forward pass, written out [unit: angle scale]."""
+    """Compute the forward pass, written out [unit: angle scale]."""
     inputs = np.concatenate([face.ravel() / 255 - 0.5, np.array(posture) / SCALE])
     hidden = np.tanh(state['hidden_weights'] @ inputs + state['hidden_biases'])
     return state['output_weights'] @ hidden + state['output_biases']
@@ -102,7 +102,7 @@ def test_all_pairs_are_learned_in_order_or_only_the_last():
     assert learned('all', whole)['trials'] == 1
 
 
-def test_error_that_was_left_is_told_in_radians():
+def test_the_last_error_is_in_radians():
     network = ThreeLayerNetwork(NetworkConfig(), seed=0)
     assert np.isnan(network.last_error_rad)
     trial = make_trial()
@@ -152,15 +152,15 @@ def test_state_restored_continues_bit_for_bit():
     assert second.trials == 4
 
 
-def test_untaught_state_restores_an_untaught_network():
-    taught = ThreeLayerNetwork(NetworkConfig(), seed=0)
-    untrained = taught.state()
-    taught.update(make_trial())
-    taught.restore(untrained)
+def test_the_initial_state_restores_the_initial_network():
+    trained = ThreeLayerNetwork(NetworkConfig(), seed=0)
+    untrained = trained.state()
+    trained.update(make_trial())
+    trained.restore(untrained)
     fresh = ThreeLayerNetwork(NetworkConfig(), seed=0)
-    for network in (taught, fresh):
+    for network in (trained, fresh):
         network.update(make_trial())
-    assert np.array_equal(taught.state()['hidden_weights'], fresh.state()['hidden_weights'])
+    assert np.array_equal(trained.state()['hidden_weights'], fresh.state()['hidden_weights'])
 
 
 @pytest.mark.parametrize(
@@ -200,7 +200,7 @@ def test_network_without_posture_does_not_see_it():
     assert np.array_equal(network.predict(FACE, (0.5, 0.2)), network.predict(FACE, (0.0, 0.0)))
 
 
-def test_a_trial_that_was_given_up_teaches_nothing():
+def test_a_trial_that_was_given_up_changes_nothing():
     network = ThreeLayerNetwork(NetworkConfig(), seed=0)
     before = network.state()
     network.update(Trial(FACE, np.zeros(2), np.zeros((1, 2)), None, np.ones((2, 2)), 2))

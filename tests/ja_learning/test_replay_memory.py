@@ -10,7 +10,9 @@ from ja_learning.core.trial import FACE_SHAPE
 def filled(trials: int, capacity: int) -> ReplayMemory:
     memory = ReplayMemory(capacity)
     for trial in range(trials):
-        memory.remember_trial(np.full(FACE_SHAPE, trial % 256, np.uint8), np.full((1 + trial % 3, 2), trial))
+        memory.remember_trial(
+            np.full(FACE_SHAPE, trial % 256, np.uint8), np.full((1 + trial % 3, 2), trial)
+        )
     return memory
 
 

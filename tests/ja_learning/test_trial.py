@@ -1,4 +1,4 @@
-"""A trial, cut out of looks, rests and fixations that nobody announces."""
+"""A trial, cut out of looks, rests and fixations that no message announces."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_trial_has_the_posture_where_each_shift_began(recorder):
 
 
 def test_fixation_may_come_before_or_after_the_rest_of_its_image(recorder):
-    """Two topics carry them: the order is nobody's."""
+    """Two topics carry them, in no fixed order."""
     recorder.observe_face(FACE, HER_FACE, CAREGIVER)
     before = recorder.observe_fixation(FIRST, BALL)
     recorder.observe_rest(FIRST)
@@ -95,7 +95,7 @@ def test_picture_that_is_no_face_is_refused(recorder, face):
         recorder.observe_face(face, HER_FACE, CAREGIVER)
 
 
-def test_a_trial_knows_what_was_seen_before_anybody_acted_on_the_face(recorder):
+def test_a_trial_knows_what_was_seen_before_the_head_acted_on_the_face(recorder):
     recorder.observe_face(FACE, HER_FACE, CAREGIVER)
     recorder.record_candidates([(0.3, 0.0)])
     recorder.observe_rest(FIRST)

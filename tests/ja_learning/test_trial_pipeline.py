@@ -1,4 +1,4 @@
-"""The trial pipeline: which trials it hands over, in which order, and what it proposes meanwhile."""
+"""The trial pipeline: which trials it hands over, in which order, and what it proposes."""
 
 import numpy as np
 import pytest

@@ -1,13 +1,13 @@
 """Detections as a table."""
 
 from ja_common.core.detection import Detection, Kind
-from ja_perception.echo_detections_node import table
+from ja_perception.echo_detections_node import format_detections
 
 
 def test_columns_stand_under_their_names():
     face = Detection(Kind.FACE, 0.0, 0.1, 160.0, 120.0, 50.0, 50.0, 0.9, 3, attended=True)
     ball = Detection(Kind.OBJECT, 0.1, 0.1, 20.5, 99.0, 8.0, 9.0, 0.25, 12, 0.25, 0.5, 0.75)
-    title, head, *lines = table(1_500_000_000, [face, ball]).splitlines()
+    title, head, *lines = format_detections(1_500_000_000, [face, ball]).splitlines()
     assert title == '1.500 s: 2 seen'
     assert lines[0].split() == [
         'face',
@@ -26,4 +26,4 @@ def test_columns_stand_under_their_names():
 
 
 def test_nothing_seen_is_said_too():
-    assert table(0, []) == '0.000 s: 0 seen'
+    assert format_detections(0, []) == '0.000 s: 0 seen'

@@ -7,7 +7,7 @@ import pytest
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.geometry import directions_of_rays, head_rotation, rays_of_directions
 from ja_perception.core.ego_motion import expected_image, rotation_homography
-from ja_perception.core.undistortion import bent, straightened
+from ja_perception.core.undistortion import distort_mask, undistort_image
 
 CAMERA = CameraModel.from_field_of_view(160, 120, np.radians(36))
 
@@ -63,7 +63,7 @@ def test_distortion_is_taken_out_and_put_back():
     camera = CameraModel(160, 120, 150, 150, 79.5, 59.5, (-0.3, 0.05, 0.0, 0.0, 0.0))
     mask = np.zeros((120, 160), np.uint8)
     mask[20:40, 20:50] = 1
-    straight = straightened(mask, camera)
+    straight = undistort_image(mask, camera)
     assert not np.array_equal(straight, mask)
-    assert (bent(straight, camera) != mask).mean() < 0.01
-    assert straightened(mask, CAMERA) is mask
+    assert (distort_mask(straight, camera) != mask).mean() < 0.01
+    assert undistort_image(mask, CAMERA) is mask

@@ -6,7 +6,7 @@ import pytest
 
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.box import Box
-from ja_perception.core.faces import Face, cut_square, without_doubles
+from ja_perception.core.faces import Face, cut_square, suppress_non_maxima
 from ja_perception.core.haar import HaarFaces
 from ja_perception.core.template_faces import TemplateFaces
 from synthetic_pictures import draw_ball, draw_face, room
@@ -91,4 +91,4 @@ def test_of_doubles_the_more_confident_stays():
     sure = Face(Box(50, 50, 20, 20), 0.9, nothing)
     unsure = Face(Box(52, 51, 22, 22), 0.6, nothing)
     other = Face(Box(90, 50, 20, 20), 0.5, nothing)
-    assert without_doubles([unsure, other, sure]) == [sure, other]
+    assert suppress_non_maxima([unsure, other, sure]) == [sure, other]

@@ -8,7 +8,7 @@ from ja_perception.core.features import (
     colour_map,
     edge_map,
     motion_map,
-    without_specks,
+    remove_specks,
 )
 
 CONFIG = FeatureConfig()
@@ -75,4 +75,4 @@ def test_specks_go_and_the_rest_stays_in_place():
     mask[2:6, 3:9] = 1
     clean = mask.copy()
     mask[9, 2] = mask[10, 5:10] = 1
-    assert np.array_equal(without_specks(mask), clean)
+    assert np.array_equal(remove_specks(mask), clean)

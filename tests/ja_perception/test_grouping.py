@@ -5,7 +5,7 @@ import pytest
 
 from ja_perception.core.box import Box
 from ja_perception.core.features import FeatureConfig, colour_map
-from ja_perception.core.grouping import Grouping, GroupingConfig, Region, merged
+from ja_perception.core.grouping import Grouping, GroupingConfig, Region, merge_regions
 from synthetic_pictures import draw_ball, room
 
 RED, ORANGE, GREEN, BLUE = (220, 30, 30), (230, 130, 20), (30, 200, 40), (30, 60, 220)
@@ -13,7 +13,7 @@ GROUPING = Grouping(GroupingConfig())
 
 
 def regions_in(picture):
-    found = GROUPING.by_colour(colour_map(picture, FeatureConfig()))
+    found = GROUPING.group_by_colour(colour_map(picture, FeatureConfig()))
     return sorted(found, key=lambda region: region.box.u)
 
 
@@ -67,15 +67,15 @@ def test_background_and_specks_are_no_objects():
 def test_texture_stands_out_from_a_plain_wall():
     edges = np.zeros((120, 160), np.uint8)
     edges[40:70:2, 60:100] = 1
-    (region,) = GROUPING.by_texture(edges)
+    (region,) = GROUPING.group_by_texture(edges)
     assert region.box.overlap(Box(79.5, 54.5, 40, 30)) > 0.95
-    assert GROUPING.by_texture(np.zeros_like(edges)) == []
+    assert GROUPING.group_by_texture(np.zeros_like(edges)) == []
 
 
 def test_rims_of_a_mover_are_one_object():
     moving = np.zeros((120, 160), np.uint8)
     moving[50:60, 70:73] = moving[50:60, 76:79] = 1
-    (region,) = GROUPING.by_motion(moving)
+    (region,) = GROUPING.group_by_motion(moving)
     assert (region.box.u, region.box.width) == (74, 9)
 
 
@@ -83,4 +83,4 @@ def test_what_overlaps_is_one_object_and_the_first_detector_names_it():
     ball = Region(Box(50, 50, 20, 20), 300)
     its_motion = Region(Box(52, 50, 30, 24))
     other = Region(Box(120, 50, 10, 10))
-    assert merged([ball], [its_motion, other]) == [ball, other]
+    assert merge_regions([ball], [its_motion, other]) == [ball, other]

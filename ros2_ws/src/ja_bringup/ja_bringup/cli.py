@@ -24,7 +24,7 @@ app = typer.Typer(
     help='A camera head that learns joint attention, on ROS 2. ROS arguments go behind '
     '`--ros-args`, as for any node: -r, -p, --params-file, __ns.',
     epilog='`./ja COMMAND --help` shows examples. The tests: `./ja test`, which takes the '
-    'arguments of pytest.',
+    'arguments of pytest. The pages of docs/ and the reference of all modules: `./ja docs`.',
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )

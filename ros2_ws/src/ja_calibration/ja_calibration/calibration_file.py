@@ -40,7 +40,7 @@ def as_dict(
 
 def save(contents: dict[str, Any], path: Path) -> None:
     """Write the file, whole or not at all. Raises OSError."""
-    text = '# Found by ./ja calibrate. Errors are standard errors; docs/deploy.md says of what.\n'
+    text = '# Found by ./ja calibrate. Errors are standard errors; see docs/deploy.md.\n'
     partial = path.with_name(f'{path.name}.partial')
     partial.write_text(text + yaml.safe_dump(contents, sort_keys=False))
     partial.replace(path)

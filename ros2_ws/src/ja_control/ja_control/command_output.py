@@ -18,17 +18,20 @@ from ja_common.topics import FORWARD_COMMANDS, JOINT_COMMANDS, JOINT_TRAJECTORY
 
 @dataclass(frozen=True)
 class CommandOutputConfig(Configuration):
-    """Which message the rig obeys; `joint_commands` is published in any case."""
+    """The message for the controller of the rig; `joint_commands` is always published."""
 
     output: str = parameter(
-        'joint_state', 'what the rig obeys',
+        'joint_state', 'message for the controller of the rig',
         choices=('joint_state', 'joint_trajectory', 'float64_multi_array'),
     )  # fmt: skip
     joint_order: str = parameter(
         'pan_tilt', 'order of the numbers of float64_multi_array', choices=('pan_tilt', 'tilt_pan')
     )
     time_from_start_s: float = parameter(
-        0.05, 'when the point of joint_trajectory is to be reached', low=0.001, high=5.0
+        0.05,
+        'time in which the head shall reach the point of joint_trajectory',
+        low=0.001,
+        high=5.0,
     )
 
 

@@ -59,7 +59,7 @@ class GateConfig(Configuration):
     lockstep: bool = parameter(
         False,
         'take the time from the images: one command an image, and no input is ever late '
-        '(else: commands at control_rate_hz, whatever the camera does)',
+        '(else: commands at control_rate_hz, with or without images)',
     )
     control_rate_hz: float = parameter(
         200.0, 'commands a second, and steps of the motion profile', low=10.0, high=500.0
@@ -72,7 +72,7 @@ class GateConfig(Configuration):
     )
     trials_file: str = parameter(
         '',
-        'file that keeps the count of trials over a restart, in a folder of its own for each '
+        'file that keeps the count of trials over a restart, in a separate folder for each '
         'namespace; empty: the count is not kept',
     )
 

@@ -28,14 +28,14 @@ class VisualFeedbackControllerNode(GraphNode):
 
     def _on_detections(self, message: PointCloud2) -> None:
         detections = decode_detections(message)
-        for publisher, seen in (
+        for publisher, detection in (
             (self._target_delta, most_salient(detections)),
             (self._face_delta, caregiver_face(detections)),
         ):
-            publisher.publish(self._joints.encode(message.header, self._delta(seen)))
+            publisher.publish(self._joints.encode(message.header, self._delta(detection)))
 
-    def _delta(self, seen: Detection | None) -> Any:
-        return None if seen is None else visual_feedback(seen.ray, self._config.gain)
+    def _delta(self, detection: Detection | None) -> Any:
+        return None if detection is None else visual_feedback(detection.ray, self._config.gain)
 
 
 def main(args: list[str] | None = None) -> None:

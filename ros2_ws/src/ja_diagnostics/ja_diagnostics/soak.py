@@ -1,4 +1,4 @@
-"""Run the whole graph for a long time: does anything grow, slow down, or get lost? (`./ja soak`)
+"""Run the whole graph for a long time (`./ja soak`): does anything grow, slow down, or get lost?
 
 psutil measures memory and processor time of every node. /diagnostics gives the rates at which it
 receives its topics: a rate below that of the camera means lost images.

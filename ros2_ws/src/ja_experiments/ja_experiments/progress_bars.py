@@ -11,7 +11,7 @@ from rich.progress import Progress as RichProgress
 
 
 class ProgressBars:
-    """Shows one bar below the other; `advance(n)` may be called from any thread."""
+    """Bars, one below the other; `advance(n)` may be called from any thread."""
 
     def __init__(self, console: Console | None = None) -> None:
         self._console = console or Console(stderr=True)

@@ -11,7 +11,7 @@ from ja_learning.core.evaluator import EvaluatorConfig, InternalEvaluator
 
 
 class InternalEvaluatorNode(GraphNode):
-    """Says for every image whether an object is fixated; nobody tells it which was meant."""
+    """Publishes for every image which object is fixated; it does not know the attended object."""
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('internal_evaluator', **node_kwargs)

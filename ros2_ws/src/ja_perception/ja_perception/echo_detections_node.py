@@ -23,11 +23,13 @@ class EchoDetectionsNode(GraphNode):
         self.subscribe(DETECTIONS, self._on_detections, expected_every_s=2.0)
 
     def _on_detections(self, message: PointCloud2) -> None:
-        print(table(to_ns(message.header.stamp), decode_detections(message)), flush=True)
+        print(
+            format_detections(to_ns(message.header.stamp), decode_detections(message)), flush=True
+        )
 
 
-def table(stamp_ns: int, detections: list[Detection]) -> str:
-    """Return the detections of one image as text."""
+def format_detections(stamp_ns: int, detections: list[Detection]) -> str:
+    """Format the detections of one image as a table."""
     title = f'{stamp_ns / 1e9:.3f} s: {len(detections)} seen'
     return '\n'.join([title, *([_HEAD] if detections else []), *map(_line, detections)])
 

@@ -168,7 +168,9 @@ class SalientFeatureDetectorNode(GraphNode):
         seconds: float,
     ) -> None:
         d_th_rad = self._config.attention.d_th_rad
-        drawn = annotate_image(image, percept.detections, percept.face_image, camera, d_th_rad, seconds)
+        drawn = annotate_image(
+            image, percept.detections, percept.face_image, camera, d_th_rad, seconds
+        )
         self._annotated_publisher.publish(encode_image(drawn, header.stamp, header.frame_id))
 
     def _camera(self, image: NDArray[np.uint8]) -> CameraModel:

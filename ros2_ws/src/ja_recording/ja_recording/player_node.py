@@ -34,7 +34,7 @@ class PlayerConfig(Configuration):
 
 
 class PlayerNode(GraphNode):
-    """Publishes the recorded bytes when they are due.
+    """A publisher of the recorded bytes, each when it is due.
 
     If the recording holds /clock (a simulation), that clock is played. Otherwise /clock is the
     time at which the messages were published. Both suit nodes with `use_sim_time`.

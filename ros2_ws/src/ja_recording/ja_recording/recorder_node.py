@@ -42,7 +42,7 @@ class RecorderConfig(Configuration):
 
 
 class RecorderNode(GraphNode):
-    """Subscribes to raw bytes and passes them to a writing thread; decodes nothing."""
+    """A subscriber to the raw bytes of all topics, with a thread that writes them; no decoding."""
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('recorder', **node_kwargs)

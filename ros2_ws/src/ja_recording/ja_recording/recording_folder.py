@@ -62,7 +62,7 @@ class _OpenFile:
 
 
 class RecordingFolder:
-    """Writes messages in the order of its calls; not thread-safe.
+    """A writer of messages in the order of its calls; not thread-safe.
 
     What `flush` has written survives a crash of this process. `close` adds the indexes, and the
     metadata.yaml of rosbag2; a file without them can be read up to its last whole message.

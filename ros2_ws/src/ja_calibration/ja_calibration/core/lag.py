@@ -133,8 +133,8 @@ def _pan_in_image(
 ) -> float:
     """Pan of the camera since the image of the points [rad]; NaN if no point was found."""
     centre = (image.grey.shape[1] - 1) / 2
-    seen = points.find_in(image.grey, np.array([focal_x * np.tan(guess_rad), 0.0]))
-    turned = np.arctan((seen[:, 0] - centre) / focal_x) - np.arctan(
+    found = points.find_in(image.grey, np.array([focal_x * np.tan(guess_rad), 0.0]))
+    turned = np.arctan((found[:, 0] - centre) / focal_x) - np.arctan(
         (points.pixels[:, 0] - centre) / focal_x
     )
     known = np.isfinite(turned)

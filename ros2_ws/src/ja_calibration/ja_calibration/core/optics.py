@@ -72,19 +72,18 @@ def fit_optics(reference: PosedImage, images: Sequence[PosedImage], sides: Array
 class _Scene:
     """N points of the reference, where they are in M images, and the images' angles and sides.
 
-    `pixels` (N, 2) and `seen` (M, N, 2) [px], `angles` (M, 2) [rad], `sides` (M, 2), `centre` (2,)
-    [px].
+    `pixels` (N, 2), `found` (M, N, 2) and `centre` (2,) [px]; `angles` (M, 2) [rad]; `sides` (M, 2).
     """
 
     pixels: NDArray[np.float64]
-    seen: NDArray[np.float64]
+    found: NDArray[np.float64]
     angles: NDArray[np.float64]
     sides: NDArray[np.float64]
     centre: NDArray[np.float64]
 
     def first_guess(self) -> NDArray[np.float64]:
         """Estimate signed focal lengths (2,) [px] from the median flow, without backlash."""
-        flow = np.nanmedian(self.seen - self.pixels, axis=1)
+        flow = np.nanmedian(self.found - self.pixels, axis=1)
         # A turn to the left moves the image to the right; a turn down moves it up.
         turned = self.angles * [1.0, -1.0]
         guess = np.sum(turned * flow, axis=0) / np.sum(turned**2, axis=0)
@@ -105,7 +104,7 @@ class _Scene:
 
         def residuals(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
             predicted = self._predicted(parameters, chosen, signs)
-            return np.nanmedian(predicted - self.seen[chosen], axis=1).ravel()
+            return np.nanmedian(predicted - self.found[chosen], axis=1).ravel()
 
         return least_squares(residuals, start, x_scale=[100.0, 100.0, *[0.01] * 4]).x
 

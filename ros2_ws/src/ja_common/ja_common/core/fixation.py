@@ -20,7 +20,7 @@ def stands_in_centre(ray: ArrayLike, d_th_rad: float) -> bool:
 
 
 def nearest_to_centre(rays: ArrayLike, d_th_rad: float) -> int | None:
-    """Return the index of the ray, of (n, 2), nearest to the centre; None if all are beyond d_th."""
+    """Return the index of the ray in (n, 2) nearest to the centre; None if none is within d_th."""
     rays = np.asarray(rays, float).reshape(-1, 2)
     if not len(rays):
         return None

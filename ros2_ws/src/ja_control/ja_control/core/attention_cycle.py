@@ -1,9 +1,8 @@
-"""The attention cycle: look at the caregiver, glance aside if the learner asks for it, shift,
-check whether an object is fixated, look back.
+"""The attention cycle: look at the caregiver, glance aside, shift, check for a fixation.
 
-Call `step` once an image. At every shift the gate draws whether visual feedback (VF) or the
-learning module (LM) turns the head (Nagai et al. 2003, section 2.2.5). A trial lasts from one look
-at the caregiver to the next.
+Call `step` once an image. The head glances only at views that the learner proposes. At every shift
+the gate draws whether visual feedback (VF) or the learning module (LM) turns the head (Nagai et
+al. 2003, section 2.2.5). A trial lasts from one look at the caregiver to the next.
 """
 
 import math

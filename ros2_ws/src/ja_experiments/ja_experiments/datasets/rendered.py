@@ -32,7 +32,7 @@ class RenderedStep:
 
 
 class RenderedTask:
-    """Connects a world, a detector and a robot; one `advance` processes one image."""
+    """A world, a detector and a robot in a loop; one `advance` processes one image."""
 
     def __init__(self, world: JointAttentionWorld, robot: Robot) -> None:
         self._world, self._robot = world, robot

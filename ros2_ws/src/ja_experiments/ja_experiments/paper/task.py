@@ -36,7 +36,7 @@ class Setting:
 
 
 class SimulatedTask:
-    """Draws settings, and computes what a camera would detect in them."""
+    """A source of random settings, and of what a camera would detect in them."""
 
     def __init__(
         self, config: TaskConfig, interest: InterestConfig, places: ObjectsSpec, looks: Looks

@@ -2,7 +2,8 @@
 
 Torch learns. To answer with it takes forty operations. Each of them costs more than its arithmetic
 when another thread has used the caches meanwhile, and waits for the interpreter again while that
-thread learns: four times as long as this pass (docs/learner.md). A test holds the two together.
+thread learns: four times as long as this pass (docs/lab_notes/learner.md). A test holds the two
+together.
 """
 
 import numpy as np

@@ -13,7 +13,7 @@ class Predictor(Protocol):
 
     @property
     def log_evidence(self) -> float:
-        """Return the evidence [nats] that the face informs the learner; 0 at first (`evidence`)."""
+        """Return the evidence [nats] that the face informs the learner; at first 0."""
 
     def propose(
         self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike

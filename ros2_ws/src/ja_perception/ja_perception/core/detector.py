@@ -105,7 +105,7 @@ class SalientFeatureDetector:
         then not known.
         """
         if self._posture_known != (posture is not None):
-            # Directions remembered without a posture mean nothing with one.
+            # Directions stored without a posture are not valid with one.
             self._posture_known = posture is not None
             self.reset()
         position = np.zeros(2) if posture is None else posture.position

@@ -42,7 +42,7 @@ def expected_image(
     affine = _affine(width, height, homography)
     if affine is None:
         return cv2.warpPerspective(before, homography, (width, height), flags=cv2.INTER_NEAREST)
-    # Three times as fast; so it is while the head rests or turns little.
+    # Three times as fast; possible while the head rests or turns little.
     return cv2.warpAffine(before, affine, (width, height), flags=cv2.INTER_NEAREST)
 
 

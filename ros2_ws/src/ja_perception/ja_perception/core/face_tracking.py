@@ -19,7 +19,7 @@ from ja_common.core.geometry import angle_between, directions_of_rays, rays_of_d
 from ja_common.core.posture import NS_PER_S
 from ja_perception.core.box import Box
 from ja_perception.core.face_crop import FACE_COLUMNS, FACE_ROWS, crop_face
-from ja_perception.core.faces import Face, FaceFinder, without_doubles
+from ja_perception.core.faces import Face, FaceFinder, suppress_non_maxima
 
 # A search for a known face takes this many face widths: the detectors are trained on that.
 _SEARCH_WIDTHS = 2.5
@@ -34,16 +34,16 @@ _SCAN_OVERLAP = 0.3
 _SAME_OVERLAP = 0.3
 # A resting face is found within this distance from its mean (in face widths).
 _JITTER_WIDTHS = 0.06
-# A face whose width differs by this share has come nearer or gone away.
+# A face whose width differs by this share has moved nearer or farther away.
 _OTHER_SIZE = 0.3
 _SIZES = 100
-# A face whose picture differs by less (3 grey levels a pixel) is where it was.
+# A face whose picture differs by less (3 grey levels a pixel) is unchanged.
 _UNCHANGED_L1 = 3 * FACE_ROWS * FACE_COLUMNS
 
 
 @dataclass(frozen=True)
 class FaceConfig(Configuration):
-    """How faces are searched for and remembered."""
+    """How faces are searched for and tracked."""
 
     new_face_score: float = parameter(
         0.7, 'confidence that a new face needs in two searches', low=0.0, high=1.0
@@ -128,7 +128,7 @@ class FaceTrack:
 
 @dataclass(frozen=True)
 class _ImageView:
-    """An image, also in grey, and how its pixels lie in space."""
+    """An image, also in grey, with its camera and posture."""
 
     image: NDArray[np.uint8]
     grey: NDArray[np.uint8]
@@ -222,7 +222,7 @@ class FaceTracker:
                     found.append(face)
                 else:
                     found += self._confirm_new_face(view.image, face, square, whole)
-        return without_doubles(found)
+        return suppress_non_maxima(found)
 
     def _smallest_square(self, width: int) -> float:
         smallest_px = max(self._config.smallest_face_share * width, _LEAST_FACE_PX)

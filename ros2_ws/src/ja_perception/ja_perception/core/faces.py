@@ -53,8 +53,8 @@ def cut_square(image: NDArray[np.uint8], square: Box, side: int) -> NDArray[np.u
     return cut
 
 
-def without_doubles(faces: list[Face], most_overlap: float = 0.4) -> list[Face]:
-    """Return the faces, most confident first, without those that a more confident one overlaps."""
+def suppress_non_maxima(faces: list[Face], most_overlap: float = 0.4) -> list[Face]:
+    """Return the faces, most confident first, without those that one before overlaps."""
     kept: list[Face] = []
     for face in sorted(faces, key=lambda f: -f.score):
         if all(face.box.overlap(other.box) <= most_overlap for other in kept):

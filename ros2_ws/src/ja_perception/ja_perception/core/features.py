@@ -20,7 +20,7 @@ _SPECK = np.ones((2, 2), np.uint8)
 
 @dataclass(frozen=True)
 class FeatureConfig(Configuration):
-    """What counts as a bright colour, an edge, a motion."""
+    """Thresholds of the features."""
 
     colour_saturation: float = parameter(
         0.5, 'HSV saturation from which a colour is bright (0-1)', low=0.0, high=1.0
@@ -74,10 +74,10 @@ def motion_map(grey: Mask, expected: Mask, config: FeatureConfig) -> Mask:
     too_light = cv2.subtract(in_same_light, cv2.dilate(expected, _NEIGHBOURS))
     too_dark = cv2.subtract(cv2.erode(expected, _NEIGHBOURS), in_same_light)
     moving = _above(cv2.max(too_light, too_dark), 255 * config.motion_contrast)
-    return cv2.copyTo(without_specks(moving), expected)
+    return cv2.copyTo(remove_specks(moving), expected)
 
 
-def without_specks(mask: Mask) -> Mask:
+def remove_specks(mask: Mask) -> Mask:
     """Return the mask without what is thinner than two pixels: noise."""
     # Opposite anchors: with its default ones an even kernel shifts the mask by a pixel.
     return cv2.dilate(cv2.erode(mask, _SPECK, anchor=(0, 0)), _SPECK, anchor=(1, 1))

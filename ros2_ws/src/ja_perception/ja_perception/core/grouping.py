@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ja_common.core.config import Configuration, parameter
 from ja_perception.core.box import Box, overlaps
-from ja_perception.core.features import ColourMap, Mask, without_specks
+from ja_perception.core.features import ColourMap, Mask, remove_specks
 from ja_perception.core.hue_families import HUES, ONE_HUE, hue_families
 from ja_perception.core.patches import Patch, hull, patches_of
 
@@ -51,9 +51,9 @@ class Grouping:
     def __init__(self, config: GroupingConfig) -> None:
         self._config = config
 
-    def by_colour(self, colour: ColourMap) -> list[Region]:
+    def group_by_colour(self, colour: ColourMap) -> list[Region]:
         """Return regions of bright colour; touching regions of different hues are separated."""
-        bright = without_specks(colour.bright)
+        bright = remove_specks(colour.bright)
         smallest = self._smallest(bright)
         parts = []
         for patch in patches_of(bright, smallest):
@@ -62,16 +62,16 @@ class Grouping:
             parts += _parts_by_hue(patch, colour.hue[rows, columns], smallest)
         return [Region(part.box, part.area) for part in self._without_background(parts, bright)]
 
-    def by_texture(self, edges: Mask) -> list[Region]:
+    def group_by_texture(self, edges: Mask) -> list[Region]:
         """Return the places that are dense with edges."""
         side = texture_window(edges)
         density = cv2.blur(edges * np.uint8(255), (side, side))
         mean, deviation = (float(value[0, 0]) for value in cv2.meanStdDev(density))
-        # A picture that is textured all over has no textured object but where it is more so.
+        # In a picture that is textured all over, an object must be more textured than the rest.
         least = max(255 * self._config.edge_density, mean + deviation)
         return self._whole_patches(cv2.compare(density, least, cv2.CMP_GT))
 
-    def by_motion(self, moving: Mask) -> list[Region]:
+    def group_by_motion(self, moving: Mask) -> list[Region]:
         """Return the regions that move; the rims of one mover are joined."""
         side = max(3, moving.shape[1] // _MOVER_SCALE | 1)
         kernel = np.ones((side, side), np.uint8)
@@ -96,7 +96,7 @@ def texture_window(edges: Mask) -> int:
     return max(3, edges.shape[1] // _TEXTURE_SCALE | 1)
 
 
-def merged(*sources: list[Region]) -> list[Region]:
+def merge_regions(*sources: list[Region]) -> list[Region]:
     """Merge the regions of several detectors: what overlaps an earlier one is the same."""
     regions = [region for source in sources for region in source]
     boxes = np.array([region.box for region in regions], float)

@@ -1,4 +1,4 @@
-"""OpenCV's Haar cascade for frontal faces (Viola and Jones 2001): the last resort."""
+"""OpenCV's Haar cascade for frontal faces (Viola and Jones 2001)."""
 
 import cv2
 import cv2.data

@@ -35,7 +35,7 @@ def hue_families(histogram: NDArray[np.float32]) -> NDArray[np.uint8] | None:
     widest_gap = max(used[0] + HUES - used[-1], (used[1:] - used[:-1]).max(initial=0))
     if HUES - widest_gap < ONE_HUE:
         return None
-    # Round the circle of hues, and a hue farther at both ends: there the other end is next.
+    # The circle of hues, extended at both ends by values of the other end.
     beyond = _REACH + 1
     round_trip = np.concatenate([histogram[-beyond:], histogram, histogram[:beyond]])
     ring = np.convolve(round_trip, _BELL, 'valid')
@@ -48,7 +48,7 @@ def hue_families(histogram: NDArray[np.float32]) -> NDArray[np.uint8] | None:
         cuts = [a + int(twice_round[a:b].argmin()) for a, b in zip(peaks, nexts, strict=True)]
         valleys = twice_round[cuts].tolist()
         heights = smooth[peaks].tolist()
-        # Each peak against the higher of its two valleys: the shallowest one falls first.
+        # Each peak against the higher of its two valleys: the shallowest peak is removed first.
         depths = [max(valleys[i - 1], valleys[i]) / heights[i] for i in range(len(peaks))]
         shallowest = depths.index(max(depths))
         if depths[shallowest] <= _VALLEY:

@@ -1,4 +1,4 @@
-"""Where something moves by itself while the head may move too."""
+"""Motion in the scene, apart from the head's own motion."""
 
 import math
 from collections import deque
@@ -14,7 +14,7 @@ from ja_common.core.geometry import head_rotation
 from ja_common.core.posture import NS_PER_S, Posture
 from ja_perception.core.ego_motion import expected_image, rotation_homography
 from ja_perception.core.features import FeatureConfig, Mask, motion_map
-from ja_perception.core.undistortion import bent, straightened
+from ja_perception.core.undistortion import distort_mask, undistort_image
 
 # Motion is coarse: it is judged on images of at most this width.
 _WIDTH_PX = 160
@@ -37,13 +37,13 @@ class MotionConfig(Configuration):
 
 @dataclass(frozen=True)
 class _Past:
-    """An image (small, smooth, nowhere 0, without lens distortion) and how the head stood then."""
+    """An image (small, smooth, nowhere 0, undistorted) and the head's rotation at its stamp."""
 
     grey: Mask
     rotation: NDArray[np.float64]
     stamp_ns: int
 
-    def apart(self, other: '_Past') -> float:
+    def angle_to(self, other: '_Past') -> float:
         """Return the angle between the two lines of sight [rad]."""
         cosine = float(self.rotation[:, 0] @ other.rotation[:, 0])
         return math.acos(max(-1.0, min(1.0, cosine)))
@@ -75,7 +75,7 @@ class MotionDetector:
         camera = camera.resized(grey.shape[1], grey.shape[0])
         rotation = head_rotation((0.0, 0.0) if posture is None else posture.position)
         # Detail as fine as the pixels looks different after every shift by part of a pixel.
-        smooth = cv2.blur(straightened(grey, camera), (3, 3))
+        smooth = cv2.blur(undistort_image(grey, camera), (3, 3))
         present = _Past(cv2.max(smooth, 1), rotation, stamp_ns)
         if posture is not None and not posture.is_still(self._config.motion_below_rad_s):
             self._past.clear()
@@ -88,7 +88,9 @@ class MotionDetector:
         moving = self._since(oldest, present, camera)
         if cv2.countNonZero(moving):
             moving &= self._since(middle, present, camera)
-        return cv2.resize(bent(moving, camera), (width, height), interpolation=cv2.INTER_NEAREST)
+        return cv2.resize(
+            distort_mask(moving, camera), (width, height), interpolation=cv2.INTER_NEAREST
+        )
 
     def _references(self, present: _Past, camera: CameraModel) -> tuple[_Past, _Past] | None:
         """Return the oldest image within the span and the view, and one half as old."""
@@ -100,7 +102,7 @@ class MotionDetector:
         oldest_ns = present.stamp_ns - self._config.motion_span_s * NS_PER_S
         farthest_rad = _FARTHEST_VIEWS * camera.width / camera.fx
         while len(past) > 1 and (
-            past[0].stamp_ns < oldest_ns or past[0].apart(present) > farthest_rad
+            past[0].stamp_ns < oldest_ns or past[0].angle_to(present) > farthest_rad
         ):
             past.popleft()
         if len(past) < 2:

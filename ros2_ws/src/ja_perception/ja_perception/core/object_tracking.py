@@ -1,4 +1,4 @@
-"""Numbers for objects that last while the head turns, and a target that does not flicker."""
+"""Track numbers that stay while the head turns, and a target that does not flicker."""
 
 import math
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class ObjectTracker:
         vectors = np.asarray(vectors, float).reshape(-1, 3)
         toward = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
         forget_ns = self._config.forget_object_after_s * NS_PER_S
-        # abs: a clock that was set back forgets as well.
+        # abs: after a clock was set back, tracks are dropped as well.
         self._tracks = [t for t in self._tracks if abs(stamp_ns - t.seen_ns) <= forget_ns]
         track_of = self._nearest_first(toward)
         ids = []

@@ -19,7 +19,7 @@ from ja_perception.core.grouping import (
     Grouping,
     GroupingConfig,
     Region,
-    merged,
+    merge_regions,
     texture_window,
 )
 from ja_perception.core.motion import MotionConfig, MotionDetector
@@ -140,10 +140,10 @@ class SalientObjects:
 
     def _regions(self, maps: _Maps) -> list[Region]:
         interest = self._interest
-        return merged(
-            self._grouping.by_colour(maps.colour) if interest.alpha_col else [],
-            self._grouping.by_motion(maps.moving) if interest.alpha_mot else [],
-            self._grouping.by_texture(maps.edges) if interest.alpha_edg else [],
+        return merge_regions(
+            self._grouping.group_by_colour(maps.colour) if interest.alpha_col else [],
+            self._grouping.group_by_motion(maps.moving) if interest.alpha_mot else [],
+            self._grouping.group_by_texture(maps.edges) if interest.alpha_edg else [],
         )
 
 
@@ -152,7 +152,7 @@ def _features(
 ) -> NDArray[np.float64]:
     """Return f_col, f_edg and f_mot, shape (n, 3), of boxes (n, 4) with ``bright_px`` (n,)."""
     height, width = maps.edges.shape
-    # Of a coarser map the last row may reach a pixel beyond the image.
+    # A box from a coarser map may reach a pixel beyond the image.
     edges = np.minimum(np.rint(corners(boxes) + 0.5), (width, height, width, height))
     edges = edges.astype(int).T
     edge_px, moving_px = _amounts(maps.edges, edges), _amounts(maps.moving, edges)
@@ -170,7 +170,7 @@ def _features(
 def _scaled(image: NDArray[np.uint8], scale: float) -> NDArray[np.uint8]:
     height, width = image.shape[:2]
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
-    # Halving is a kernel of its own: twice is three times as fast as a quarter at once.
+    # OpenCV halves with a special kernel: halving twice is three times as fast as one quarter.
     while width >= 2 * size[0] and height >= 2 * size[1]:
         width, height = (width + 1) // 2, (height + 1) // 2
         image = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)

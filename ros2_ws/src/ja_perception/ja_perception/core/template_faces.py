@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ja_perception.core.box import Box
-from ja_perception.core.faces import Face, FaceFinder, cut_square, without_doubles
+from ja_perception.core.faces import Face, FaceFinder, cut_square, suppress_non_maxima
 
 _CUT_PX = 128
 # Widths of the face tried, as shares of the square's side.
@@ -39,7 +39,9 @@ class TemplateFaces:
                 self._template = _grey(image, _squared(found[0].box), _TEMPLATE_PX)
             return found
         cut = _grey(image, square, _CUT_PX)
-        return without_doubles([f for share in _SCALES for f in self._match(cut, share, square)])
+        return suppress_non_maxima(
+            [f for share in _SCALES for f in self._match(cut, share, square)]
+        )
 
     def _match(self, cut: NDArray[np.uint8], share: float, square: Box) -> list[Face]:
         side = round(share * _CUT_PX)

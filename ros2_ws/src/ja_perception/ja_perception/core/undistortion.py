@@ -1,4 +1,4 @@
-"""Pictures as a camera without lens distortion would have taken them."""
+"""Images without lens distortion, and masks with it."""
 
 from functools import lru_cache
 
@@ -11,15 +11,15 @@ from ja_common.core.camera_model import CameraModel
 Maps = tuple[NDArray, NDArray]
 
 
-def straightened(image: NDArray[np.uint8], camera: CameraModel) -> NDArray[np.uint8]:
+def undistort_image(image: NDArray[np.uint8], camera: CameraModel) -> NDArray[np.uint8]:
     """Return an (H, W) image without the lens distortion of ``camera``."""
     if not camera.distortion:
         return image
     return cv2.remap(image, *_straight_from_bent(camera), cv2.INTER_LINEAR)
 
 
-def bent(mask: NDArray[np.uint8], camera: CameraModel) -> NDArray[np.uint8]:
-    """Return an (H, W) mask of the straightened image in pixels of the original."""
+def distort_mask(mask: NDArray[np.uint8], camera: CameraModel) -> NDArray[np.uint8]:
+    """Return an (H, W) mask of the undistorted image in pixels of the original."""
     if not camera.distortion:
         return mask
     return cv2.remap(mask, *_bent_from_straight(camera), cv2.INTER_NEAREST)

@@ -23,7 +23,7 @@ class Intrinsics:
     cy: float
 
     @classmethod
-    def of_view(cls, spec: HeadSpec, image_size: tuple[int, int]) -> Intrinsics:
+    def from_view(cls, spec: HeadSpec, image_size: tuple[int, int]) -> Intrinsics:
         """Return the camera whose picture of (width, height) [px] spans the head's view."""
         width, height = image_size
         return cls(

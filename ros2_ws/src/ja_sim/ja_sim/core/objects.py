@@ -1,4 +1,4 @@
-"""Objects on and above the table: where they are drawn, and how they look."""
+"""Objects on and above the table: their random places and their appearance."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ _GEOMS = {
 
 
 class ObjectBodies:
-    """The bodies of the objects in the compiled scene; changing their looks recompiles nothing."""
+    """The bodies of the objects in the compiled scene; a new appearance recompiles nothing."""
 
     def __init__(self, spec: mujoco.MjSpec, count: int) -> None:
         for index in range(count):

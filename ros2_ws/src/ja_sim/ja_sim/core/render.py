@@ -14,7 +14,7 @@ import numpy as np
 
 from ja_sim.core.graphics import ADVICE, RenderError, choose_backend
 
-# Drawn larger by this factor and reduced. Measured (docs/world.md): the rasteriser's own
+# Drawn larger by this factor and reduced. Measured (docs/lab_notes/world.md): the rasteriser's own
 # multisampling costs twice as much for the same edges.
 SUPERSAMPLING = 1.5
 

@@ -77,7 +77,7 @@ class JointAttentionWorld:
     def __init__(self, scene: Scene, seed: int, image_size: tuple[int, int] = (320, 240)) -> None:
         """Build the world; ``image_size``: (width, height) [px]. RenderError without OpenGL."""
         self.scene = scene
-        self.intrinsics = Intrinsics.of_view(scene.head, image_size)
+        self.intrinsics = Intrinsics.from_view(scene.head, image_size)
         self.clamped = False
         self._seed = seed
         self._head = PanTiltHead(scene.head)
