@@ -13,7 +13,7 @@ from bootstrap.setup_environment import Environment
 
 
 def main(root: Path, args: Sequence[str]) -> None:
-    """Never returns: the process becomes the command, or ends with a sentence."""
+    """Prepare the environment and become the command, or end with a sentence; never return."""
     testing = list(args[:1]) == ['test']
     documenting = list(args[:1]) == ['docs']
     environment = Environment(root, os.environ)

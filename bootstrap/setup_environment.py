@@ -172,6 +172,8 @@ class Environment:
                     'asked': asked,
                 },
             )
+            # At once: an interrupted set-up continues with the same parts.
+            self._record('without', list(without))
         elif step.name == 'packages':
             self.report('installing the packages of ros2_ws')
             self._pip(

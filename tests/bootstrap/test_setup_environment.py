@@ -91,7 +91,7 @@ def test_the_pages_need_one_step_more(checkout):
 
 
 def installed(environment: Recorded) -> set[str]:
-    """Names of the packages of ours that the last command installed."""
+    """Return the names of our packages that the last command installed."""
     return {Path(word).name for word in environment.commands[-1].split() if 'ros2_ws' in word}
 
 
@@ -120,6 +120,16 @@ def test_a_part_that_is_left_out_of_a_full_environment_is_remembered(checkout):
     environment = Recorded(checkout)
     environment.prepare()
     assert environment.did() == []
+
+
+def test_an_interrupted_setup_remembers_what_is_left_out(checkout):
+    environment = Recorded(checkout, {'JA_WITHOUT': 'sim'})
+    environment.fail_at = 'base.lock'
+    with pytest.raises(KeyboardInterrupt):
+        environment.prepare()
+    environment = Recorded(checkout)
+    environment.prepare()
+    assert environment.did() == ['base.lock', 'dashboard.lock', '-e ']
 
 
 def test_the_tests_need_every_part(checkout):

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Header
 
 from bootstrap.plan import PARTS
+from ja_common.executor import CachedWaitSetExecutor
 from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.topics import DETECTIONS, IMAGE, JOINT_STATES
@@ -80,10 +80,10 @@ class FakeRig(Node):
 
 
 @pytest.fixture
-def fake_rig(ros_context: Context) -> Iterator[tuple[FakeRig, SingleThreadedExecutor]]:
+def fake_rig(ros_context: Context) -> Iterator[tuple[FakeRig, CachedWaitSetExecutor]]:
     """Return the fake rig and the executor that runs it."""
     rig = FakeRig(ros_context)
-    executor = SingleThreadedExecutor(context=ros_context)
+    executor = CachedWaitSetExecutor(context=ros_context)
     executor.add_node(rig)
     yield rig, executor
     executor.shutdown()

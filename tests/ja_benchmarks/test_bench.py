@@ -1,4 +1,4 @@
-"""The door to the benchmarks; what stands behind it is measured elsewhere, not tested here."""
+"""The command `./ja bench`; the benchmarks themselves are not run here."""
 
 import importlib
 import json

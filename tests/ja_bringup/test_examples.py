@@ -23,7 +23,7 @@ def test_help_shows_what_the_command_does_and_examples(name: str) -> None:
         assert f'{line}   # {purpose}' in shown
 
 
-def test_there_are_no_examples_of_commands_that_are_gone() -> None:
+def test_there_are_no_examples_of_removed_commands() -> None:
     assert EXAMPLES.keys() <= COMMANDS.keys()
 
 

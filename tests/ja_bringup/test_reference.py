@@ -1,4 +1,4 @@
-"""docs/topics.md and docs/parameters.md say what the code does."""
+"""docs/topics.md and docs/parameters.md agree with the code."""
 
 from pathlib import Path
 

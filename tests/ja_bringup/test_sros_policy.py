@@ -25,21 +25,21 @@ def names(found):
     return {name.lstrip('/') for name, _ in found}
 
 
-def test_the_policy_is_what_the_graph_itself_tells_of_every_node():
+def test_the_policy_is_what_the_graph_reports_of_every_node():
     with every_node() as nodes:
         policy = ElementTree.fromstring(policy_xml(nodes))
         for node in nodes:
             name, where = node.get_name(), (node.get_name(), node.get_namespace())
-            said = names(node.get_publisher_names_and_types_by_node(*where))
-            heard = names(node.get_subscriber_names_and_types_by_node(*where))
-            offered = names(node.get_service_names_and_types_by_node(*where))
-            assert said <= allowed(policy, name, 'topics', 'publish')
-            assert heard <= allowed(policy, name, 'topics', 'subscribe')
-            assert offered <= allowed(policy, name, 'services', 'reply')
-            spare = allowed(policy, name, 'topics', 'publish') - said
+            published = names(node.get_publisher_names_and_types_by_node(*where))
+            subscribed = names(node.get_subscriber_names_and_types_by_node(*where))
+            replied = names(node.get_service_names_and_types_by_node(*where))
+            assert published <= allowed(policy, name, 'topics', 'publish')
+            assert subscribed <= allowed(policy, name, 'topics', 'subscribe')
+            assert replied <= allowed(policy, name, 'services', 'reply')
+            spare = allowed(policy, name, 'topics', 'publish') - published
             assert spare <= BY_CONFIGURATION | {'parameter_events'}
-            # /clock is heard where use_sim_time is on.
-            spare = allowed(policy, name, 'topics', 'subscribe') - heard
+            # A node subscribes to /clock where use_sim_time is on.
+            spare = allowed(policy, name, 'topics', 'subscribe') - subscribed
             assert spare <= BY_CONFIGURATION | {'clock', 'parameter_events'}
         commanders = [
             n.get_name()
@@ -47,8 +47,13 @@ def test_the_policy_is_what_the_graph_itself_tells_of_every_node():
             if 'joint_commands' in allowed(policy, n.get_name(), 'topics', 'publish')
         ]
         assert commanders == ['gate'], 'it alone commands the head'
-        deaf = ('gate', 'learning_module', 'internal_evaluator', 'salient_feature_detector')
-        for name in deaf:
+        without_truth = (
+            'gate',
+            'learning_module',
+            'internal_evaluator',
+            'salient_feature_detector',
+        )
+        for name in without_truth:
             assert not [t for t in allowed(policy, name, 'topics', 'subscribe') if 'sim/' in t]
 
 

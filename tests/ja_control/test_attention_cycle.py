@@ -50,8 +50,8 @@ class AngleWorld:
             fixation=self.position + centred[0] if centred and still else None,
         )
 
-    def obey(self, target):
-        """Advance by the time of one image."""
+    def follow(self, target):
+        """Follow a target for the time of one image."""
         self._orders.append(np.array(target))
         reach = self._speed * PERIOD_S
         way = np.clip(self._orders.popleft() - self.position, -reach, reach)
@@ -74,7 +74,7 @@ def run(cycle, world, images):
     for _ in range(images):
         percept = world.percept()
         decision = cycle.step(percept)
-        world.obey(decision.target)
+        world.follow(decision.target)
         rounds.append((percept, decision))
     return rounds
 
@@ -223,7 +223,7 @@ def test_shift_to_a_target_outside_the_limits_has_arrived_where_they_end():
     shifts = []
     for _ in range(12):
         decision = cycle.step(world.percept())
-        world.obey(reachable(decision.target))
+        world.follow(reachable(decision.target))
         shifts.append(decision.shifts)
     assert max(shifts) >= 2
 
@@ -370,7 +370,7 @@ def test_glances_end_at_max_glances(most, taken):
     for _ in range(30):
         always_more(world)
         decision = cycle.step(world.percept())
-        world.obey(decision.target)
+        world.follow(decision.target)
         if decision.phase is Phase.GLANCE and decision.trials == 0:
             targets.append(tuple(decision.target))
     assert len(set(targets)) == taken
@@ -390,7 +390,7 @@ def test_gate_waits_for_a_late_fixation():
             if since_ns is None or now_ns - since_ns < 2e8:
                 percept = replace(percept, fixation=None)
             decision = cycle.step(percept)
-            world.obey(decision.target)
+            world.follow(decision.target)
             shifts = max(shifts, decision.shifts)
         return shifts
 
@@ -407,7 +407,7 @@ def test_the_gate_follows_the_evidence():
         decisions = []
         for _ in range(60):
             decisions.append(cycle.step(replace(world.percept(), log_evidence=evidence)))
-            world.obey(decisions[-1].target)
+            world.follow(decisions[-1].target)
         assert {round(d.p_lm, 3) for d in decisions} == {p_lm}
         wanted = Source.LEARNING_MODULE if p_lm else Source.VISUAL_FEEDBACK
         # The shift under way when the evidence changed was drawn before.

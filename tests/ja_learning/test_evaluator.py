@@ -26,38 +26,40 @@ def head(pan=0.0, tilt=0.0, velocity=(0.0, 0.0)):
 
 
 def test_fixation_is_the_direction_of_the_object_not_of_the_camera():
-    direction = NEAREST.fixation([ball(0.05, -0.02)], head(pan=0.3))
+    direction = NEAREST.find_fixation([ball(0.05, -0.02)], head(pan=0.3))
     assert direction == pytest.approx((0.3 - math.atan(0.05), math.atan(-0.02)), abs=1e-4)
 
 
 def test_object_outside_d_th_is_not_fixated():
-    assert NEAREST.fixation([ball(0.11)], head()) is None
-    assert NEAREST.fixation([ball(0.08, 0.08)], head()) is None, 'the distance, not each axis'
-    assert NEAREST.fixation([], head()) is None
+    assert NEAREST.find_fixation([ball(0.11)], head()) is None
+    assert NEAREST.find_fixation([ball(0.08, 0.08)], head()) is None, 'the distance, not each axis'
+    assert NEAREST.find_fixation([], head()) is None
 
 
 def test_nearest_object_counts_however_faint():
     seen = [ball(0.09, score=9.0), ball(-0.02, score=0.1)]
-    assert NEAREST.fixation(seen, head())[0] == pytest.approx(math.atan(0.02))
+    assert NEAREST.find_fixation(seen, head())[0] == pytest.approx(math.atan(0.02))
 
 
 def test_most_salient_of_the_view_may_be_asked_instead():
     near = ball(-0.02, score=0.1)
-    assert MOST_SALIENT.fixation([near, ball(0.5, score=9.0)], head()) is None
-    assert MOST_SALIENT.fixation([near, ball(0.09, score=9.0)], head())[0] == pytest.approx(
+    assert MOST_SALIENT.find_fixation([near, ball(0.5, score=9.0)], head()) is None
+    assert MOST_SALIENT.find_fixation([near, ball(0.09, score=9.0)], head())[0] == pytest.approx(
         -math.atan(0.09)
     )
 
 
 def test_face_nearer_to_the_centre_is_what_the_head_watches():
-    assert NEAREST.fixation([ball(0.05), face(0.02)], head()) is None
-    assert NEAREST.fixation([ball(0.05), face(0.07)], head()) is not None
+    assert NEAREST.find_fixation([ball(0.05), face(0.02)], head()) is None
+    assert NEAREST.find_fixation([ball(0.05), face(0.07)], head()) is not None
 
 
 @pytest.mark.parametrize('velocity', [(0.06, 0.0), (0.0, -0.06)])
 def test_nothing_is_fixated_while_the_head_moves(velocity):
-    assert NEAREST.fixation([ball(0.0)], head(velocity=velocity)) is None
-    assert NEAREST.fixation([ball(0.0)], head(velocity=np.multiply(velocity, 0.5))) is not None
+    assert NEAREST.find_fixation([ball(0.0)], head(velocity=velocity)) is None
+    assert (
+        NEAREST.find_fixation([ball(0.0)], head(velocity=np.multiply(velocity, 0.5))) is not None
+    )
 
 
 def test_a_glance_is_no_fixation():
@@ -66,7 +68,7 @@ def test_a_glance_is_no_fixation():
 
     def seen(stamp_s, pan=0.0, velocity=(0.0, 0.0)):
         posture = Posture(round(stamp_s * 1e9), np.array([pan, 0.0]), np.array(velocity))
-        return evaluator.fixation([ball(0.0)], posture) is not None
+        return evaluator.find_fixation([ball(0.0)], posture) is not None
 
     assert [seen(0.0), seen(0.1), seen(0.2), seen(0.3)] == [False, False, True, True]
     assert [seen(0.4, pan=0.5), seen(0.5, pan=0.5)] == [False, False], 'turned between two images'

@@ -16,7 +16,7 @@ def weighed(evidence: Evidence, trials: int, log_p, seed: int = 0) -> list[float
     rng = np.random.default_rng(seed)
     history = []
     for trial in range(trials):
-        evidence.weigh(face_of(trial % 256), lambda faces: log_p(rng, len(faces))[None])
+        evidence.weigh_trial(face_of(trial % 256), lambda faces: log_p(rng, len(faces))[None])
         history.append(float(evidence.nats[0]))
     return history
 
@@ -49,7 +49,7 @@ def test_nothing_is_weighed_before_there_are_other_faces():
 def test_one_trial_without_an_attended_object_costs_little():
     evidence = Evidence()
     before = weighed(evidence, 40, knowing)[-1]
-    evidence.weigh(face_of(0), lambda faces: np.array([[-1e6] + [0.0] * (len(faces) - 1)]))
+    evidence.weigh_trial(face_of(0), lambda faces: np.array([[-1e6] + [0.0] * (len(faces) - 1)]))
     assert before - evidence.nats[0] < 3
 
 
@@ -57,7 +57,7 @@ def test_beliefs_are_weighed_side_by_side():
     evidence = Evidence(beliefs=2)
     rng = np.random.default_rng(0)
     for trial in range(60):
-        evidence.weigh(
+        evidence.weigh_trial(
             face_of(trial), lambda f: np.array([knowing(rng, len(f)), by_chance(rng, len(f))])
         )
     assert evidence.nats[0] > 20 > 5 > evidence.nats[1]
@@ -78,7 +78,7 @@ def test_a_change_is_noticed_soon_and_no_bad_luck_is_taken_for_one():
     def trials_to_alarm(log_ratios):
         alarm = ChangeAlarm()
         for trial, ratio in enumerate(log_ratios, 1):
-            if alarm.raised_by(ratio, knew=True):
+            if alarm.add_log_ratio(ratio, knew=True):
                 return trial, alarm.doubtful_trials
         return None, alarm.doubtful_trials
 
@@ -93,4 +93,4 @@ def test_a_change_is_noticed_soon_and_no_bad_luck_is_taken_for_one():
 
 def test_a_learner_that_never_knew_anything_raises_no_alarm():
     alarm = ChangeAlarm()
-    assert not any(alarm.raised_by(-2.0, knew=False) for _ in range(100))
+    assert not any(alarm.add_log_ratio(-2.0, knew=False) for _ in range(100))

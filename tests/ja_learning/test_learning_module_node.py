@@ -2,6 +2,7 @@
 
 import os
 from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 import pytest
@@ -173,6 +174,27 @@ def test_in_lockstep_it_answers_with_what_it_knew_a_trial_ago(make_trials):
         trials.send_fixation(0.3, (0.4, 0.1))
         if trials.learned > 1:
             network.update(Trial(FACE, np.zeros(2), np.array([(0.0, 0.0)]), np.array((0.4, 0.1))))
+
+
+def test_every_trial_that_is_learned_is_reported_with_its_stamp(make_bench):
+    updates = []
+
+    def on_update(trial, stamp_ns):
+        updates.append((trial.fixation is None, stamp_ns // MS))
+
+    make_node = partial(LearningModuleNode, on_update=on_update)
+    trials = NodeTrials(make_bench(make_node, PUBLISHED, [LM_DELTA]))
+    trials.send_trial()
+    ended_ms = trials.ms
+    trials.send_look()
+    trials.send_rest(0.3)
+    trials.send_look()
+    assert updates[1] == (True, trials.ms), 'given up'
+    assert updates[0][0] is False
+    assert updates[0][1] <= ended_ms
+    trials.bench.call(SetBool, 'learning_enabled', data=False)
+    trials.send_fixation(0.3, (0.4, 0.1))
+    assert len(updates) == 2
 
 
 def test_disabled_learning_still_proposes(trials):

@@ -26,9 +26,4 @@ setup(
     zip_safe=False,
     # From this `colcon test` knows that it has to start pytest; see setup.cfg.
     extras_require={'test': ['pytest']},
-    entry_points={
-        'console_scripts': [
-            'calibration = ja_calibration.calibration_node:main',
-        ],
-    },
 )

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from ja_calibration.calibration_file import as_dict
-from ja_calibration.calibration_node import CalibrationNode
+from ja_calibration.calibrator import Calibrator
 from ja_common.executor import CachedWaitSetExecutor
 from ja_common.private_context import private_executor
 
@@ -22,7 +22,7 @@ def run_calibration(
     """
     # Ctrl-C must not end the context: the head has to brake first.
     with private_executor(arguments) as executor:
-        node = CalibrationNode(context=executor.context)
+        node = Calibrator(context=executor.context)
         executor.add_node(node)
         try:
             _spin_until_done(node, executor, patience_s, report)
@@ -35,7 +35,7 @@ def run_calibration(
 
 
 def _spin_until_done(
-    node: CalibrationNode,
+    node: Calibrator,
     executor: CachedWaitSetExecutor,
     patience_s: float,
     report: Callable[[str], None],
@@ -52,7 +52,7 @@ def _spin_until_done(
             raise ValueError(f'no progress for {patience_s:g} s; the head was {why}')
 
 
-def _brake(node: CalibrationNode, executor: CachedWaitSetExecutor) -> None:
+def _brake(node: Calibrator, executor: CachedWaitSetExecutor) -> None:
     node.stop()
     # The error that ended the run is on its way already; do not raise a second one.
     node.sequence = None

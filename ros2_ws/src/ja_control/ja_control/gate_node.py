@@ -6,14 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, Trigger
 
 from ja_common.core.config import ConfigError, Configuration, parameter
-from ja_common.core.health import Level
 from ja_common.core.posture import REORDERED_WITHIN_S, Posture
 from ja_common.core.stamps import NS_PER_S
 from ja_common.graph_node import GraphNode, spin_node
@@ -43,6 +41,7 @@ from ja_control.core.gating import Gating, GatingConfig
 from ja_control.core.joint_limits import JointLimitsConfig
 from ja_control.core.trial_count import load_trials, save_trials
 from ja_control.core.urdf_limits import narrow_limits, read_joint
+from ja_control.gate_status import encode_gate_status
 
 _PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, GLANCE_DELTA, FIXATION)
 # Longer than any image takes: the head does not turn in the time of a clock set forward.
@@ -266,30 +265,14 @@ class GateNode(GraphNode):
         return changed
 
     def _publish_status(self, command: Command) -> None:
-        hold, decision = self._hold, self._decision
-        values = {
-            'trials': str(self._cycle.trials),
-            'enabled': str(self._guard.enabled),
-            'phase': self._cycle.phase.value,
-        }
-        level, message = Level.OK, self._cycle.phase.value
-        if hold is not None:
-            level, message = hold.level, f'hold: {hold.text}'
-            values['reason'] = hold.text
-        if decision is not None:
-            values |= {
-                'phase': decision.phase.value,
-                'source': decision.source.value,
-                'p_lm': f'{decision.p_lm:.4f}',
-                'shifts': str(decision.shifts),
-            }
-        values['clamped'] = command.clamped
         self._status.publish(
-            DiagnosticStatus(
-                level=bytes([level]),
-                name=self.get_fully_qualified_name(),
-                message=message,
-                values=[KeyValue(key=key, value=value) for key, value in values.items()],
+            encode_gate_status(
+                self.get_fully_qualified_name(),
+                self._cycle,
+                enabled=self._guard.enabled,
+                clamped=command.clamped,
+                hold=self._hold,
+                decision=self._decision,
             )
         )
 

@@ -11,7 +11,7 @@ from ja_learning.core.evaluator import EvaluatorConfig, InternalEvaluator
 
 
 class InternalEvaluatorNode(GraphNode):
-    """Publishes for every image which object is fixated; it does not know the attended object."""
+    """The node of Eq. 3: one fixation an image. It does not know the attended object."""
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('internal_evaluator', **node_kwargs)
@@ -25,7 +25,7 @@ class InternalEvaluatorNode(GraphNode):
         self._evaluator.config = config
 
     def _evaluate(self, found: StampedSet) -> None:
-        fixation = self._evaluator.fixation(found[DETECTIONS], found.posture)
+        fixation = self._evaluator.find_fixation(found[DETECTIONS], found.posture)
         self._fixation.publish(self._joints.encode(found.header, fixation))
 
 

@@ -40,7 +40,7 @@ from ja_learning.persistent_learner import PersistentLearner
 
 @dataclass(frozen=True)
 class LearningModuleConfig(Configuration):
-    """What the node needs beyond the learner itself."""
+    """Configuration of the node beyond that of the learner."""
 
     seed: int = parameter(0, 'seed of the initial weights', low=0)
     learning_enabled_at_start: bool = parameter(True, 'learn from the start')
@@ -61,7 +61,7 @@ class LearningModuleConfig(Configuration):
 
 
 class LearningModuleNode(GraphNode):
-    """Publishes one proposal an image while a trial is under way; learns once a trial.
+    """The node that proposes once an image while a trial is under way, and learns once a trial.
 
     Trials are learned in a thread of their own (`PersistentLearner`): no proposal waits for that.
     """

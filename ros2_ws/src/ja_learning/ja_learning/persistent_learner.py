@@ -25,7 +25,7 @@ CLOSING_S = 1.0
 
 
 class PersistentLearner:
-    """Continues from the newest good checkpoint; is saved every so many trials, and at the end.
+    """A learner that continues from the newest good checkpoint, and is saved as it learns.
 
     Offers the services `save_checkpoint` and `load_checkpoint`, and reports to the node's health.
     """

@@ -16,7 +16,7 @@ from ja_recording.core.reader import RecordedMessage
 
 
 class DrivenNode:
-    """Feeds a node with recorded messages, and keeps what it publishes.
+    """A node that gets recorded messages, and whose own messages are kept.
 
     Nothing depends on scheduling: the same messages and parameters give the same answers, bit for
     bit. Timers do not run.

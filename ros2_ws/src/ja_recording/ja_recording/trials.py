@@ -109,7 +109,7 @@ class _Look:
 
 
 class TrialExtractor:
-    """Follows a driven learner through a recording; it alone looks at the truth."""
+    """A follower of a driven learner through a recording; it alone reads the truth."""
 
     def __init__(self, learner: DrivenNode, ended: list[tuple[Trial, int]]) -> None:
         """Follow this learner, whose `on_update` appends trials and their stamps to `ended`."""

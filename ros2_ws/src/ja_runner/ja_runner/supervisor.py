@@ -197,8 +197,8 @@ class Supervisor:
                 process.send_signal(number)
             if self._wait():
                 return
-            alive = [p.spec.executable for p in self._processes if p.popen.poll() is None]
-            self._report(f'{", ".join(alive)} did not end on {signal.Signals(number).name}')
+            running = [p.spec.executable for p in self._processes if p.popen.poll() is None]
+            self._report(f'{", ".join(running)} did not end on {signal.Signals(number).name}')
 
     def _wait(self) -> bool:
         """Wait until all have ended; return False if they do not end in time."""

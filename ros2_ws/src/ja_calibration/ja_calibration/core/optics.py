@@ -72,7 +72,8 @@ def fit_optics(reference: PosedImage, images: Sequence[PosedImage], sides: Array
 class _Scene:
     """N points of the reference, where they are in M images, and the images' angles and sides.
 
-    `pixels` (N, 2), `found` (M, N, 2) and `centre` (2,) [px]; `angles` (M, 2) [rad]; `sides` (M, 2).
+    `pixels` (N, 2), `found` (M, N, 2) and `centre` (2,) [px]; `angles` (M, 2) [rad]; `sides`
+    (M, 2).
     """
 
     pixels: NDArray[np.float64]

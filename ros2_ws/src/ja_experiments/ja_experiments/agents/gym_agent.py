@@ -21,7 +21,7 @@ from ja_perception.core.detector import SalientFeatureDetector
 
 
 class GymAgent:
-    """Acts on observations of `JointAttention-v0`; it never sees the reward.
+    """An agent for `JointAttention-v0` around any learner; it never sees the reward.
 
     `p_lm`: how often it follows the learner; else it turns to what is most salient (Eq. 2).
     """

@@ -76,7 +76,7 @@ class OnlineLearner:
         seen = caregiver_face(detections)
         attended = None if face is None or seen is None else (face, seen.ray)
         proposal = self._pipeline.process_image(posture, np.reshape(rays, (-1, 2)), attended)
-        fixation = self._evaluator.fixation(detections, posture)
+        fixation = self._evaluator.find_fixation(detections, posture)
         if fixation is not None:
             self._pipeline.process_fixation(posture, fixation)
         return proposal, fixation

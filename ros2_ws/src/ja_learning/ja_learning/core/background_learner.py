@@ -12,7 +12,7 @@ Answer = TypeVar('Answer')
 
 
 class BackgroundLearner:
-    """Owns a learner, which no one else may touch but through `call_with_learner`.
+    """A learner in a thread of its own; others reach it only through `call_with_learner`.
 
     An update shows in the answers of `predictor` all at once, when it is over. When that is
     depends on what else the machine has to do. For the same answers in every run, set `behind`:

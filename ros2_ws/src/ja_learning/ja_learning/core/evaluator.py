@@ -19,7 +19,7 @@ from ja_learning.core.trial import same_posture
 
 @dataclass(frozen=True)
 class EvaluatorConfig(Configuration):
-    """When an object counts as fixated."""
+    """Configuration of the internal evaluator: when an object counts as fixated."""
 
     d_th_rad: float = parameter(
         WIDTH_SIXTH,
@@ -42,13 +42,14 @@ class EvaluatorConfig(Configuration):
 
 
 class InternalEvaluator:
-    """Eq. 3 on what one image after the other shows, while the head stands still."""
+    """Eq. 3 on one image after the other, while the head stands still."""
 
     def __init__(self, config: EvaluatorConfig) -> None:
+        """Start with a head that has not stood still yet; `config` may be replaced at any time."""
         self.config = config
         self._rests: Posture | None = None
 
-    def fixation(
+    def find_fixation(
         self, detections: list[Detection], posture: Posture
     ) -> NDArray[np.float64] | None:
         """Return the direction (pan, tilt), shape (2,) [rad], of the fixated object, or None.

@@ -37,7 +37,7 @@ class Evidence:
         self.nats: NDArray[np.float64] = np.zeros(beliefs)
         self._others: list[NDArray[np.uint8]] = []
 
-    def weigh(
+    def weigh_trial(
         self,
         face: NDArray[np.uint8],
         log_probability: Callable[[NDArray[np.uint8]], NDArray[np.float64]],
@@ -83,7 +83,7 @@ class ChangeAlarm:
         self.doubt = 0.0
         self.doubtful_trials = 0
 
-    def raised_by(self, log_ratio: float, knew: bool) -> bool:
+    def add_log_ratio(self, log_ratio: float, knew: bool) -> bool:
         """Add a trial's log ratio [nats]; return whether it shows a change.
 
         `knew`: whether the learner knew something before this trial.

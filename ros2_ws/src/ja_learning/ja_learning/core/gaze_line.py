@@ -53,7 +53,7 @@ _WRONG_NATS = 8.0
 
 
 class GazeLineLearner:
-    """Learns from all that was seen in a trial; proposes the most probable gaze target."""
+    """A learner from all that was seen in a trial, with no use for the fixation."""
 
     kind = 'gaze_line'
 
@@ -146,8 +146,8 @@ class GazeLineLearner:
             return np.concatenate([of_members, mixed[None]])
 
         knew = self.log_evidence > _CLEAR_NATS
-        log_ratio = float(self._evidence.weigh(face, log_probability)[-1])
-        return self._alarm.raised_by(log_ratio, knew)
+        log_ratio = float(self._evidence.weigh_trial(face, log_probability)[-1])
+        return self._alarm.add_log_ratio(log_ratio, knew)
 
     def _step(self, inverse_temperature: torch.Tensor) -> None:
         members, known = self.config.members, len(self._memory)

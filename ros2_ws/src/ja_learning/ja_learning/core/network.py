@@ -113,7 +113,7 @@ class ThreeLayerNetwork:
     def _weigh(self, trial: Trial) -> None:
         seen = trial.candidates[: trial.seen_before_shift]
         if len(seen):
-            self._evidence.weigh(
+            self._evidence.weigh_trial(
                 trial.face,
                 lambda faces: np.logaddexp.reduce(
                     self.log_density(faces, trial.face_at, seen), axis=1

@@ -68,7 +68,7 @@ class Trial:
 
 
 class TrialRecorder:
-    """Cuts the stream of looks, postures at rest and fixations into trials."""
+    """A recorder that cuts looks, postures at rest and fixations into trials."""
 
     def __init__(self, same_within_rad: float = SAME_POSTURE_RAD) -> None:
         """Start between two trials; postures nearer than this in both joints are the same."""

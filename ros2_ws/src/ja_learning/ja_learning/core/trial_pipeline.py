@@ -42,7 +42,7 @@ class Proposal:
 
 
 class TrialPipeline:
-    """Cuts images into trials, proposes while one is under way, and hands over finished ones."""
+    """The way from images to proposals and finished trials."""
 
     def __init__(
         self,

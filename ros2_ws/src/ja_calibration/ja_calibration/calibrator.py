@@ -31,7 +31,7 @@ _GENTLE_ACCELERATION_RAD_S2 = 1.5
 
 
 @dataclass(frozen=True)
-class CalibrationNodeConfig(Configuration):
+class CalibratorConfig(Configuration):
     """What the node needs beyond the moves and the guard."""
 
     control_rate_hz: float = parameter(
@@ -39,7 +39,7 @@ class CalibrationNodeConfig(Configuration):
     )
 
 
-class CalibrationNode(GraphNode):
+class Calibrator(GraphNode):
     """Commands the head through the moves of a calibration; `sequence.result` is its result.
 
     Its callbacks raise ValueError where the head or the images allow no calibration.
@@ -53,7 +53,7 @@ class CalibrationNode(GraphNode):
         self.joints = JointCodec(self.configure(JointConfig))
         self._config = self.configure(CalibrationConfig)
         self._limits = self.configure(JointLimitsConfig)
-        period_s = 1.0 / self.configure(CalibrationNodeConfig).control_rate_hz
+        period_s = 1.0 / self.configure(CalibratorConfig).control_rate_hz
         self._guard = CommandGuard(self._limits, self.configure(CommandGuardConfig), period_s)
         self._speed_rad_s = np.nan
         self._velocity = np.zeros(2)

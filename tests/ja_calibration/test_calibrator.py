@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ja_calibration.calibration_node import CalibrationNode
+from ja_calibration.calibrator import Calibrator
 from ja_common.image_codec import encode_image
 from ja_common.topics import IMAGE, JOINT_COMMANDS, JOINT_STATES
 from node_bench import NodeBench
@@ -17,7 +17,7 @@ START = (0.3, -0.1)
 @pytest.fixture
 def bench(make_bench: Callable[..., NodeBench]) -> NodeBench:
     return make_bench(
-        CalibrationNode,
+        Calibrator,
         publishes=[JOINT_STATES, IMAGE],
         subscribes=[JOINT_COMMANDS],
         stall_error_rad=3.0,
@@ -68,7 +68,7 @@ def test_stopped_it_brakes_and_holds(bench: NodeBench) -> None:
 
 
 def test_two_nodes_do_not_command_one_head(make_bench: Callable[..., NodeBench]) -> None:
-    bench = make_bench(CalibrationNode, publishes=[JOINT_STATES, IMAGE])
+    bench = make_bench(Calibrator, publishes=[JOINT_STATES, IMAGE])
     bench.peer.create_publisher(
         JOINT_COMMANDS.type, JOINT_COMMANDS.name, JOINT_COMMANDS.publisher_qos
     )
@@ -83,7 +83,7 @@ def test_two_nodes_do_not_command_one_head(make_bench: Callable[..., NodeBench])
 
 
 def test_a_start_near_the_limits_is_refused(make_bench: Callable[..., NodeBench]) -> None:
-    bench = make_bench(CalibrationNode, publishes=[JOINT_STATES, IMAGE], pan_max_rad=0.35)
+    bench = make_bench(Calibrator, publishes=[JOINT_STATES, IMAGE], pan_max_rad=0.35)
 
     def publish_forever() -> bool:
         publish_now(bench)

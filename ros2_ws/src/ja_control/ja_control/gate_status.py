@@ -1,0 +1,46 @@
+"""The status message of the gate: its decision, and why it holds the head."""
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+from ja_common.core.health import Level
+from ja_control.core.attention_cycle import AttentionCycle, Decision
+from ja_control.core.command_guard import Hold
+
+
+def encode_gate_status(
+    name: str,
+    cycle: AttentionCycle,
+    *,
+    enabled: bool,
+    clamped: str,
+    hold: Hold | None,
+    decision: Decision | None,
+) -> DiagnosticStatus:
+    """Return the status of the gate with this node name.
+
+    `clamped` names the limits that cut the motion. `decision` is None between two images: the
+    values `source`, `p_lm` and `shifts` are then left out.
+    """
+    values = {
+        'trials': str(cycle.trials),
+        'enabled': str(enabled),
+        'phase': cycle.phase.value,
+    }
+    level, message = Level.OK, cycle.phase.value
+    if hold is not None:
+        level, message = hold.level, f'hold: {hold.text}'
+        values['reason'] = hold.text
+    if decision is not None:
+        values |= {
+            'phase': decision.phase.value,
+            'source': decision.source.value,
+            'p_lm': f'{decision.p_lm:.4f}',
+            'shifts': str(decision.shifts),
+        }
+    values['clamped'] = clamped
+    return DiagnosticStatus(
+        level=bytes([level]),
+        name=name,
+        message=message,
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )
