@@ -19,7 +19,7 @@ class StampJoin:
         self._sets: dict[int, dict[str, Any]] = {}
 
     def collect_value(self, key: str, stamp_ns: int, value: Any) -> dict[str, Any] | None:
-        """Add a value; return the complete set {key: value} of its stamp, or None while some lack."""
+        """Add a value; return the complete set {key: value} of its stamp, or None."""
         if key not in self._keys:
             raise KeyError(f'{key!r} is not one of {sorted(self._keys)}')
         collected = self._sets.setdefault(stamp_ns, {})
