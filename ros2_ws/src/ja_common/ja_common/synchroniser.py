@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -82,7 +82,7 @@ class Synchroniser:
         self._patient: PatientQueue[tuple[Callback, StampedSet]] | None = None
         self._joins: list[StampJoin] = []
         self._callbacks: list[Callback] = []
-        self._dispatcher: StampOrderedDispatcher | None = None
+        self._dispatcher: StampOrderedDispatcher | None = None  # one set needs no order
         if joints is not None:
             node.subscribe(JOINT_STATES, self._on_joint_states, joints_expected_every_s)
         if patience_s is not None:
@@ -123,7 +123,8 @@ class Synchroniser:
         """
         index = len(self._callbacks)
         self._callbacks.append(callback)
-        self._dispatcher = StampOrderedDispatcher([str(i) for i in range(index + 1)])
+        if index:
+            self._dispatcher = StampOrderedDispatcher([str(i) for i in range(index + 1)])
         first, *_ = decoders
         base = StampJoin([topic.name for topic in decoders])
         whole = StampJoin([topic.name for topic in (*decoders, *(also or {}))])
@@ -146,9 +147,9 @@ class Synchroniser:
             else:
                 found = {topic.name: value}
             for name, each in found.items():
-                both = whole.collect_value(name, stamp_ns, each)
-                if both is not None:
-                    complete(message, stamp_ns, both)
+                joined = whole.collect_value(name, stamp_ns, each)
+                if joined is not None:
+                    complete(message, stamp_ns, joined)
 
         for topic, decode in decoders.items():
             self._node.subscribe(topic, partial(collect, topic, decode), expected_every_s)
@@ -168,7 +169,7 @@ class Synchroniser:
 
     def _dispatch(self, index: int, found: StampedSet) -> None:
         call = partial(self._callbacks[index], found)
-        if len(self._callbacks) == 1 or self._dispatcher is None:
+        if self._dispatcher is None:
             call()
         else:
             self._dispatcher.queue_action(str(index), found.stamp_ns, call)
@@ -179,14 +180,14 @@ class Synchroniser:
             for (call, found), _, posture in self._patient.pop_ready(
                 self._is_calibrated(), time.monotonic()
             ):
-                call(_with_posture(found, posture))
+                call(replace(found, posture_or_none=posture))
             return
         for (call, found), posture in self._strict.pop_ready():
             if posture is None:
                 text = 'no joint state for the stamp of an image: skipped'
                 self._node.report_problem('posture', text)
             else:
-                call(_with_posture(found, posture))
+                call(replace(found, posture_or_none=posture))
 
     def _on_joint_states(self, message: JointState) -> None:
         assert self._joints is not None
@@ -196,7 +197,3 @@ class Synchroniser:
         velocity = self._joints.decode_velocity(message)
         self._history.record_posture(to_ns(message.header.stamp), position, velocity)
         self.call_ready()
-
-
-def _with_posture(found: StampedSet, posture: Posture | None) -> StampedSet:
-    return StampedSet(found.header, found.stamp_ns, found.values, posture)

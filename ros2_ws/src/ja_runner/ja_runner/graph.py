@@ -1,6 +1,5 @@
 """Which nodes make a graph, and their presets; a graph is a list of NodeSpec."""
 
-import importlib.util
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
@@ -11,6 +10,7 @@ import yaml
 
 from ja_common.core.config import ConfigError
 from ja_runner.node_spec import NodeSpec
+from ja_runner.parts import is_installed
 
 CONFIG = Path(str(files('ja_runner'))) / 'config'
 
@@ -37,7 +37,7 @@ def replace_nodes(graph: Sequence[NodeSpec], replacements: Sequence[str]) -> lis
         if ours not in {node.executable for node in graph}:
             known = ', '.join(node.executable for node in graph)
             raise ConfigError(f'{replacement}: no node {ours!r} in this graph; there are {known}')
-        if not (package and executable and _exists(f'{package}.{executable}_node')):
+        if not (package and executable and is_installed(f'{package}.{executable}_node')):
             raise ConfigError(
                 f'{replacement}: write NODE=PACKAGE/EXECUTABLE, where Python finds a file '
                 'PACKAGE/EXECUTABLE_node.py (PYTHONPATH)'
@@ -49,13 +49,6 @@ def replace_nodes(graph: Sequence[NodeSpec], replacements: Sequence[str]) -> lis
         else node
         for node in graph
     ]
-
-
-def _exists(module: str) -> bool:
-    try:
-        return importlib.util.find_spec(module) is not None
-    except ModuleNotFoundError:  # the package itself
-        return False
 
 
 def preset(path: Path, executable: str) -> dict[str, Any]:

@@ -14,11 +14,11 @@ PART_OF = {
 """The part of each package that JA_WITHOUT may leave out, when `./ja` installs the packages."""
 
 
-def is_installed(package: str) -> bool:
-    """Return whether Python finds a package; nothing of it is imported."""
+def is_installed(module: str) -> bool:
+    """Return whether Python finds a package, or a module, whose package alone is imported."""
     try:
-        return importlib.util.find_spec(package) is not None
-    except ModuleNotFoundError:
+        return importlib.util.find_spec(module) is not None
+    except ModuleNotFoundError:  # the package of the module
         return False
 
 
