@@ -11,10 +11,13 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 
-from bootstrap.plan import SUPPORTED, Python
+from bootstrap.plan import SUPPORTED, Python, SystemPackage
 
+# The first line takes the current folder off the path: a file `json.py` there is not ours. It
+# cannot be -I, which would hide the rclpy of a sourced ROS.
 _PROBE = """
-import importlib.util as util, json, sys
+import sys; sys.path[:1] == [''] and sys.path.pop(0)
+import importlib.util as util, json
 print(json.dumps([sys.executable, sys.version_info[:2],
                   util.find_spec('rclpy') is not None, util.find_spec('ensurepip') is not None]))
 """
@@ -25,6 +28,7 @@ def clean_environ(environ: Mapping[str, str]) -> dict[str, str]:
 
     The ROS wheels start Python again with their library folders on LD_LIBRARY_PATH and a mark
     that this was done; inherited, both would make our Python load the other one's libraries.
+    Empty entries of PYTHONPATH, which mean the current folder, are left out as well.
     """
     clean = {
         name: value
@@ -36,6 +40,9 @@ def clean_environ(environ: Mapping[str, str]) -> dict[str, str]:
         clean['LD_LIBRARY_PATH'] = os.pathsep.join(
             folder for folder in folders if folder and 'site-packages' not in folder
         )
+    if 'PYTHONPATH' in environ:
+        folders = environ['PYTHONPATH'].split(os.pathsep)
+        clean['PYTHONPATH'] = os.pathsep.join(filter(None, folders))
     return clean
 
 
@@ -72,17 +79,21 @@ def pythons(environ: Mapping[str, str], existing: str | None = None) -> Iterator
             yield python
 
 
-def missing_system_packages(python: Python, renders: bool = True) -> list[str]:
-    """Return Debian's names of the system packages without which the set-up or the sim would fail.
+def missing_system_packages(python: Python, renders: bool = True) -> list[SystemPackage]:
+    """Return the system packages without which the set-up or the sim would fail.
 
     `renders`: the sim is installed, which needs a graphics library.
     """
     missing = []
     if not python.has_ensurepip:
-        missing.append('python{}.{}-venv'.format(*python.version))
+        name = 'python{}.{}-venv'.format(*python.version)
+        missing.append(SystemPackage(name, 'to make the virtual environment', vital=True))
     can_render = (_loads('libEGL.so.1') and _has_gl_driver()) or _loads('libOSMesa.so.8')
     if renders and not can_render:
-        missing += ['libegl1', 'libgl1-mesa-dri']
+        missing += [
+            SystemPackage(name, 'to render the simulated world without a display')
+            for name in ('libegl1', 'libgl1-mesa-dri')
+        ]
     return missing
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,15 +11,18 @@ from pathlib import Path
 from bootstrap.machine import clean_environ
 from bootstrap.plan import BootstrapError
 from bootstrap.setup_environment import Environment
+from bootstrap.shared_memory import check_shared_memory
 
 
 def main(root: Path, args: Sequence[str]) -> None:
     """Prepare the environment and become the command, or end with a sentence; never return."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     testing = list(args[:1]) == ['test']
     documenting = list(args[:1]) == ['docs']
     environment = Environment(root, os.environ)
     try:
         environment.prepare(dev=testing, docs=testing or documenting)
+        check_shared_memory()
     except BootstrapError as error:
         sys.exit(f'ja: {error}')
     except KeyboardInterrupt:
@@ -31,6 +35,10 @@ def main(root: Path, args: Sequence[str]) -> None:
         os.chdir(root)
         command = ['-m', 'tools.build_docs', *args[1:]]
     else:
-        command = ['-m', 'ja_bringup.cli', *args]
+        # The installed script: `-m` would search the current folder for every import.
+        command = [environment.script, *args]
+        # Python has a handler for SIGINT before any line of ours, and would end an import with a
+        # traceback; `ja_bringup.__main__` lets the signal through.
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     sys.stdout.flush()
     os.execve(environment.python, [environment.python, *command], clean_environ(os.environ))

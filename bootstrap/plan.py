@@ -38,6 +38,18 @@ class Python:
         return SUPPORTED[0] <= self.version <= SUPPORTED[1]
 
 
+@dataclass(frozen=True)
+class SystemPackage:
+    """A package of the system that is missing: Debian's name, and what it is needed for.
+
+    `vital`: the set-up cannot go on without it.
+    """
+
+    name: str
+    why: str
+    vital: bool = False
+
+
 def ros_is_sourced(environ: Mapping[str, str]) -> bool:
     """Return whether ROS 2 Jazzy is sourced.
 
@@ -115,6 +127,21 @@ def fingerprint(*parts: str | bytes) -> str:
     return digest.hexdigest()[:16]
 
 
+def is_stamp(stamp: object) -> bool:
+    """Return whether this is a stamp as the set-up writes it, and not what remains of one."""
+    if not isinstance(stamp, dict):
+        return False
+    python, without = stamp.get('python', {}), stamp.get('without', [])
+    version = python.get('version', [0, 0]) if isinstance(python, dict) else None
+    return (
+        isinstance(version, list)
+        and [type(part) for part in version] == [int, int]
+        and (python == {} or isinstance(python.get('executable'), str))
+        and isinstance(without, list)
+        and all(isinstance(part, str) for part in without)
+    )
+
+
 def steps_to_do(steps: Iterable[Step], stamp: Mapping[str, str]) -> list[Step]:
     """Return the steps that are missing or outdated; after a new environment, all that follow."""
     todo: list[Step] = []
@@ -125,15 +152,45 @@ def steps_to_do(steps: Iterable[Step], stamp: Mapping[str, str]) -> list[Step]:
     return todo
 
 
-def apt_advice(packages: Iterable[str], is_root: bool, has_apt: bool) -> str | None:
+NO_SYSTEM_PACKAGES = 'JA_NO_SYSTEM_PACKAGES'
+"""Environment variable: unless empty or 0, no system package is installed, nor asked for."""
+
+
+def listed(packages: Iterable[SystemPackage]) -> str:
+    """Return the names of system packages, and what they are needed for: `a, b (for this)`."""
+    names_of: dict[str, list[str]] = {}
+    for package in packages:
+        names_of.setdefault(package.why, []).append(package.name)
+    return ', '.join(f'{", ".join(names)} ({why})' for why, names in names_of.items())
+
+
+def left_out(packages: Iterable[SystemPackage], environ: Mapping[str, str]) -> bool:
+    """Return whether the user wants no system packages.
+
+    Raises BootstrapError when the set-up cannot go on without one of them.
+    """
+    if environ.get(NO_SYSTEM_PACKAGES, '') in ('', '0'):
+        return False
+    vital = [package for package in packages if package.vital]
+    if vital:
+        raise BootstrapError(
+            f'{NO_SYSTEM_PACKAGES} is set, but the set-up cannot go on without {listed(vital)}: '
+            'install it, or name another Python with JA_PYTHON=/path/to/python'
+        )
+    return True
+
+
+def apt_advice(packages: Iterable[SystemPackage], is_root: bool, has_apt: bool) -> str | None:
     """Return the sentence for a user who must install system packages; None when we can."""
-    names = ' '.join(packages)
     if is_root and has_apt:
         return None
+    missing = list(packages)
+    choice = f'{NO_SYSTEM_PACKAGES}=1 before the command goes on without'
     if has_apt:
+        names = ' '.join(package.name for package in missing)
         command = f'sudo apt-get update && sudo apt-get install -y {names}'
-        return f'system packages are missing; install them with: {command}'
+        return f'missing are {listed(missing)}; {choice}; install them with: {command}'
     return (
-        'system libraries are missing (Debian names them '
-        f'{names}): install them with your package manager'
+        f'system libraries are missing, by their names in Debian: {listed(missing)}; install them '
+        f'with your package manager; {choice}'
     )

@@ -16,19 +16,26 @@ from pathlib import Path
 
 from bootstrap import machine
 from bootstrap.plan import (
+    NO_SYSTEM_PACKAGES,
     PARTS,
     BootstrapError,
     Python,
     Step,
+    SystemPackage,
     apt_advice,
     choose_python,
     fingerprint,
+    is_stamp,
+    left_out,
+    listed,
     parts_left_out,
     ros_is_sourced,
     steps_to_do,
 )
 
 STAMP = 'ja-stamp.json'
+# The only one without hashes: the machine chooses a build for its CPU or its GPU.
+TORCH_LOCK = 'torch.lock'
 _OFFLINE = ('NewConnectionError', 'Failed to establish', 'NameResolution', 'Temporary failure')
 
 
@@ -51,6 +58,11 @@ class Environment:
     def python(self) -> str:
         """Return the path of the environment's interpreter."""
         return str(self.folder / 'bin' / 'python')
+
+    @property
+    def script(self) -> str:
+        """Return the path of the commands' script, which ja_bringup installs."""
+        return str(self.folder / 'bin' / 'ja')
 
     @property
     def log(self) -> Path:
@@ -119,6 +131,7 @@ class Environment:
         wanted = [
             *([] if sourced else ['ros.lock']),
             'base.lock',
+            TORCH_LOCK,
             *(f'{part}.lock' for part in PARTS if part not in without),
         ]
         ros = self.environ.get('AMENT_PREFIX_PATH', '') if sourced else 'wheels'
@@ -144,13 +157,20 @@ class Environment:
         candidates = machine.pythons(self.environ, existing)
         return choose_python(candidates, self.environ.get('JA_PYTHON'), sourced)
 
-    def _install_system_packages(self, names: Sequence[str]) -> None:
-        if not names:
+    def _install_system_packages(self, missing: Sequence[SystemPackage]) -> None:
+        if not missing:
             return
-        advice = apt_advice(names, machine.is_root(), machine.has_apt())
+        if left_out(missing, self.environ):
+            self.report(f'left out, as {NO_SYSTEM_PACKAGES} wants it: {listed(missing)}')
+            return
+        advice = apt_advice(missing, machine.is_root(), machine.has_apt())
         if advice:
             raise BootstrapError(advice)
-        self.report(f'installing system packages: {" ".join(names)}')
+        self.report(
+            f'installing system packages with apt-get: {listed(missing)}; '
+            f'{NO_SYSTEM_PACKAGES}=1 would leave them out'
+        )
+        names = [package.name for package in missing]
         apt = {**self.environ, 'DEBIAN_FRONTEND': 'noninteractive'}
         self._run(['apt-get', 'update'], apt)
         self._run(['apt-get', 'install', '-y', '--no-install-recommends', *names], apt)
@@ -162,7 +182,7 @@ class Environment:
                 'making the virtual environment .venv (Python {}.{})'.format(*python.version)
             )
             self._write_stamp({})
-            self._run([python.executable, '-m', 'venv', '--clear', str(self.folder)])
+            self._run([python.executable, '-I', '-m', 'venv', '--clear', str(self.folder)])
             asked = shutil.which(self.environ.get('JA_PYTHON', '')) or python.executable
             self._record(
                 'python',
@@ -188,12 +208,15 @@ class Environment:
         else:
             lock = self.root / 'requirements' / step.name
             self.report(f'installing requirements/{step.name} (the first time takes minutes)')
-            self._pip('--prefer-binary', '-r', str(lock))
+            hashes = [] if step.name == TORCH_LOCK else ['--require-hashes']
+            self._pip('--prefer-binary', *hashes, '-r', str(lock))
         self._record(step.name, step.fingerprint)
         self.report(f'  done in {time.monotonic() - began:.0f} s')
 
     def _pip(self, *args: str) -> None:
-        self._run([self.python, '-m', 'pip', '--disable-pip-version-check', 'install', *args])
+        # -I, as above: a file `pip.py` in the current folder, or in PYTHONPATH, is not pip.
+        pip = [self.python, '-I', '-m', 'pip', '--disable-pip-version-check']
+        self._run([*pip, 'install', *args])
 
     def _run(self, command: Sequence[str], environ: Mapping[str, str] | None = None) -> None:
         """Run a command, its output into the log; raises BootstrapError when it fails."""
@@ -234,9 +257,9 @@ class Environment:
             return {}
         try:
             stamp = json.loads((self.folder / STAMP).read_text())
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             return {}
-        return stamp if isinstance(stamp, dict) else {}
+        return stamp if is_stamp(stamp) else {}
 
     def _record(self, name: str, value: object) -> None:
         self._write_stamp({**self._stamp(), name: value})

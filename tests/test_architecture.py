@@ -175,7 +175,7 @@ def test_contexts_are_made_in_one_module():
     }
     assert makers == {
         Path('ja_common/ja_common/private_context.py'),
-        Path('ja_common/ja_common/graph_node.py'),
+        Path('ja_common/ja_common/node_main.py'),
         Path('ja_diagnostics/ja_diagnostics/image_stream.py'),
     }
 

@@ -37,7 +37,7 @@ ROSDEP_KEYS = {
     'yaml': 'python3-yaml',
 }
 # rosdep has no key for these; pip installs them from requirements/.
-WITHOUT_KEY = {'distributed', 'markdown_it', 'mcap', 'nicegui', 'pyarrow', 'zstandard'}
+WITHOUT_KEY = {'distributed', 'lz4', 'markdown_it', 'mcap', 'nicegui', 'pyarrow', 'zstandard'}
 # Libraries whose name in requirements/*.in is not that of the module.
 DISTRIBUTIONS = {
     'cv2': 'opencv-python-headless',
@@ -141,14 +141,25 @@ def test_the_locks_agree_with_one_another(lock):
     def pins(name: str) -> dict[str, set[str]]:
         found: dict[str, set[str]] = {}
         for line in (ROOT / 'requirements' / name).read_text().splitlines():
-            if line and not line.startswith('#'):
-                distribution, version = line.split(';')[0].strip().split('==')
-                found.setdefault(distribution, set()).add(version)
+            if '==' in line and not line.startswith('#'):
+                distribution, version = line.split(';')[0].strip(' \\').split('==')
+                found.setdefault(distribution.partition('[')[0], set()).add(version)
         return found
 
     base = pins('base.lock')
     for distribution, versions in pins(lock).items():
         assert versions == base.get(distribution, versions)
+
+
+@pytest.mark.parametrize(
+    'lock', sorted((ROOT / 'requirements').glob('*.lock')), ids=lambda p: p.name
+)
+def test_every_pin_has_hashes_but_that_of_torch(lock):
+    """Torch comes in builds for the CPU and for GPUs, of which the machine chooses one."""
+    text = re.sub(r'^#.*\n', '', lock.read_text(), flags=re.M)
+    pins = re.split(r'^(?=\S)', text, flags=re.M)[1:]
+    without = [pin.split('==')[0] for pin in pins if '--hash=sha256:' not in pin]
+    assert without == (['torch'] if lock.name == 'torch.lock' else [])
 
 
 def test_there_is_one_version():

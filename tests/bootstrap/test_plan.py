@@ -6,6 +6,7 @@ from bootstrap.plan import (
     BootstrapError,
     Python,
     Step,
+    SystemPackage,
     apt_advice,
     choose_python,
     fingerprint,
@@ -78,10 +79,13 @@ def test_the_fingerprint_separates_its_parts():
 
 
 def test_apt_advice_gives_the_exact_command_to_those_who_lack_the_right():
-    assert apt_advice(['libegl1'], is_root=True, has_apt=True) is None
+    both = [SystemPackage(name, 'to render') for name in ('libegl1', 'libgl1-mesa-dri')]
+    assert apt_advice(both, is_root=True, has_apt=True) is None
     command = 'sudo apt-get update && sudo apt-get install -y libegl1 libgl1-mesa-dri'
-    assert command in apt_advice(['libegl1', 'libgl1-mesa-dri'], is_root=False, has_apt=True)
-    assert 'package manager' in apt_advice(['libegl1'], is_root=True, has_apt=False)
+    advice = apt_advice(both, is_root=False, has_apt=True)
+    assert command in advice
+    assert 'libegl1, libgl1-mesa-dri (to render)' in advice
+    assert 'package manager' in apt_advice(both, is_root=True, has_apt=False)
 
 
 def test_without_the_sim_there_are_no_experiments():

@@ -9,7 +9,7 @@ import pytest
 
 from bootstrap import machine, setup_environment
 from bootstrap.machine import clean_environ, probe_python
-from bootstrap.plan import PARTS, BootstrapError, Python
+from bootstrap.plan import PARTS, BootstrapError, Python, SystemPackage
 from bootstrap.setup_environment import STAMP, Environment
 
 ROOT = Path(__file__).parents[2]
@@ -20,7 +20,8 @@ class Recorded(Environment):
     """Does not run anything; `fail_at` is a word of the command that is interrupted."""
 
     def __init__(self, root: Path, environ: dict[str, str] | None = None) -> None:
-        super().__init__(root, environ or {}, report=lambda _: None)
+        self.reports: list[str] = []
+        super().__init__(root, environ or {}, report=self.reports.append)
         self.commands: list[str] = []
         self.fail_at = ''
 
@@ -55,7 +56,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         for file in ('setup.py', 'setup.cfg', 'package.xml'):
             (package / file).touch()
     (tmp_path / 'requirements').mkdir()
-    for name in ('ros', 'base', 'dev', 'docs', *PARTS):
+    for name in ('ros', 'base', 'torch', 'dev', 'docs', *PARTS):
         (tmp_path / 'requirements' / f'{name}.lock').write_text(name)
     monkeypatch.setattr(machine, 'missing_system_packages', lambda python, renders: [])
     monkeypatch.setattr(
@@ -67,7 +68,14 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_all_the_steps_once_and_then_none(checkout):
     environment = Recorded(checkout)
     environment.prepare()
-    assert environment.did() == ['-m venv', 'ros.lock', 'base.lock', *PART_LOCKS, '-e ']
+    assert environment.did() == [
+        '-m venv',
+        'ros.lock',
+        'base.lock',
+        'torch.lock',
+        *PART_LOCKS,
+        '-e ',
+    ]
     environment.prepare()
     assert environment.did() == []
 
@@ -99,7 +107,7 @@ def test_a_rig_leaves_out_the_parts_that_it_does_not_need(checkout):
     environment = Recorded(checkout, {'JA_WITHOUT': 'sim dashboard experiments'})
     environment.prepare()
     assert installed(environment) == {'ja_one'}
-    assert environment.did() == ['-m venv', 'ros.lock', 'base.lock', '-e ']
+    assert environment.did() == ['-m venv', 'ros.lock', 'base.lock', 'torch.lock', '-e ']
 
 
 def test_what_is_left_out_is_remembered_and_may_be_added_later(checkout):
@@ -129,7 +137,7 @@ def test_an_interrupted_setup_remembers_what_is_left_out(checkout):
         environment.prepare()
     environment = Recorded(checkout)
     environment.prepare()
-    assert environment.did() == ['base.lock', 'dashboard.lock', '-e ']
+    assert environment.did() == ['base.lock', 'torch.lock', 'dashboard.lock', '-e ']
 
 
 def test_the_tests_need_every_part(checkout):
@@ -157,7 +165,7 @@ def test_an_interrupted_setup_goes_on_where_it_was(checkout):
     assert environment.did() == ['-m venv', 'ros.lock']
     environment.fail_at = ''
     environment.prepare()
-    assert environment.did() == ['base.lock', *PART_LOCKS, '-e ']
+    assert environment.did() == ['base.lock', 'torch.lock', *PART_LOCKS, '-e ']
 
 
 def test_a_damaged_stamp_or_a_lost_environment_means_a_new_one(checkout):
@@ -176,30 +184,105 @@ def test_where_ros_is_sourced_no_ros_wheel_is_installed(checkout):
     sourced = {'ROS_DISTRO': 'jazzy', 'AMENT_PREFIX_PATH': '/opt/ros/jazzy'}
     environment = Recorded(checkout, sourced)
     environment.prepare()
-    assert environment.did() == ['-m venv', 'base.lock', *PART_LOCKS, '-e ']
+    assert environment.did() == ['-m venv', 'base.lock', 'torch.lock', *PART_LOCKS, '-e ']
     # And the other way round: the same checkout in a shell without ROS.
     environment = Recorded(checkout, {})
     environment.prepare()
-    assert environment.did() == ['-m venv', 'ros.lock', 'base.lock', *PART_LOCKS, '-e ']
+    assert environment.did() == [
+        '-m venv',
+        'ros.lock',
+        'base.lock',
+        'torch.lock',
+        *PART_LOCKS,
+        '-e ',
+    ]
 
 
-def test_missing_system_packages_are_installed_by_root(checkout, monkeypatch):
-    monkeypatch.setattr(machine, 'missing_system_packages', lambda python, renders: ['libegl1'])
-    monkeypatch.setattr(machine, 'is_root', lambda: True)
-    monkeypatch.setattr(machine, 'has_apt', lambda: True)
+EGL = SystemPackage('libegl1', 'to render the simulated world without a display')
+VENV = SystemPackage('python3.12-venv', 'to make the virtual environment', vital=True)
+
+
+@pytest.fixture
+def lacking(monkeypatch: pytest.MonkeyPatch):
+    """Return a function that makes system packages missing, for root or for another user."""
+
+    def lack(*packages: SystemPackage, root: bool = True) -> None:
+        monkeypatch.setattr(machine, 'missing_system_packages', lambda *_, **__: list(packages))
+        monkeypatch.setattr(machine, 'is_root', lambda: root)
+        monkeypatch.setattr(machine, 'has_apt', lambda: True)
+
+    return lack
+
+
+def test_system_packages_are_installed_by_root_after_saying_which_and_why(checkout, lacking):
+    lacking(VENV, EGL)
     environment = Recorded(checkout)
     environment.prepare()
     assert environment.commands[0] == 'apt-get update'
-    assert environment.commands[1].endswith('libegl1')
+    assert environment.commands[1].endswith('python3.12-venv libegl1')
+    [said] = [line for line in environment.reports if 'apt-get' in line]
+    assert 'libegl1 (to render the simulated world without a display)' in said
+    assert 'python3.12-venv (to make the virtual environment)' in said
+    assert 'JA_NO_SYSTEM_PACKAGES=1 would leave them out' in said
 
 
-def test_missing_system_packages_are_named_to_others(checkout, monkeypatch):
-    monkeypatch.setattr(machine, 'missing_system_packages', lambda python, renders: ['libegl1'])
-    monkeypatch.setattr(machine, 'is_root', lambda: False)
-    environment = Recorded(checkout)
-    with pytest.raises(BootstrapError, match='libegl1'):
+@pytest.mark.parametrize('root', [True, False])
+def test_system_packages_can_be_left_out_and_what_will_be_missing_is_said(checkout, lacking, root):
+    lacking(EGL, root=root)
+    environment = Recorded(checkout, {'JA_NO_SYSTEM_PACKAGES': '1'})
+    environment.prepare()
+    assert environment.did()[0] == '-m venv'
+    [said] = [line for line in environment.reports if 'left out' in line]
+    assert 'libegl1 (to render the simulated world without a display)' in said
+
+
+def test_what_the_set_up_itself_needs_cannot_be_left_out(checkout, lacking):
+    lacking(VENV, EGL)
+    environment = Recorded(checkout, {'JA_NO_SYSTEM_PACKAGES': 'yes'})
+    with pytest.raises(BootstrapError, match=r'cannot go on without python3\.12-venv \(to make'):
         environment.prepare()
     assert environment.commands == []
+
+
+@pytest.mark.parametrize('value', ['', '0'])
+def test_an_empty_variable_leaves_nothing_out(checkout, lacking, value):
+    lacking(EGL)
+    environment = Recorded(checkout, {'JA_NO_SYSTEM_PACKAGES': value})
+    environment.prepare()
+    assert environment.commands[0] == 'apt-get update'
+
+
+def test_missing_system_packages_are_named_to_others(checkout, lacking):
+    lacking(EGL, root=False)
+    environment = Recorded(checkout)
+    with pytest.raises(BootstrapError, match=r'libegl1.*JA_NO_SYSTEM_PACKAGES=1'):
+        environment.prepare()
+    assert environment.commands == []
+
+
+def test_pip_takes_only_files_whose_hashes_are_in_the_locks_but_for_torch(checkout):
+    environment = Recorded(checkout)
+    environment.prepare(dev=True, docs=True)
+    locks = [text for text in environment.commands if text.endswith('.lock')]
+    assert len(locks) == 5 + len(PARTS)
+    unhashed = [text for text in locks if '--require-hashes' not in text]
+    assert [text.rsplit('/', 1)[1] for text in unhashed] == ['torch.lock']
+
+
+@pytest.mark.parametrize(
+    'stamp',
+    ['5', '[]', '{"python": 5}', '{"python": {}, "without": 5}', '{"python": {"version": "x"}}',
+     '{"python": {"version": [3]}}', '{"python": {"version": [3, 12]}}', '[' * 10**5,
+     '{"without": [1]}', '\0'],
+    ids=lambda text: text[:30],
+)  # fmt: skip
+def test_a_stamp_that_makes_no_sense_means_a_new_environment(checkout, stamp):
+    environment = Recorded(checkout)
+    environment.prepare()
+    environment.did()
+    (environment.folder / STAMP).write_text(stamp)
+    environment.prepare()
+    assert environment.did()[0] == '-m venv'
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from ja_common.private_context import private_executor
 from ja_common.topics import DIAGNOSTICS
 from ja_runner.graph import sim_graph
 from ja_runner.node_spec import NodeSpec
-from ja_runner.supervisor import Supervisor
+from ja_runner.supervisor import Supervision, Supervisor
 
 KILLS = 2
 EVERY_TRIALS = 3
@@ -64,7 +64,7 @@ def test_a_killed_learner_loses_few_trials_and_learns_on(tmp_path):
 
 def kill_learner(counter: LearnedTrials, executor: Executor, tmp_path: Path) -> None:
     """Kill the learner `KILLS` times while the graph runs, and compare its counts of trials."""
-    supervisor = Supervisor(graph(tmp_path / 'kept'), tmp_path / 'log', 'restart', print)
+    supervisor = Supervisor(graph(tmp_path / 'kept'), tmp_path / 'log', Supervision('restart'))
     counts: list[tuple[int, int]] = []
 
     def kill_and_wait() -> Iterator[None]:

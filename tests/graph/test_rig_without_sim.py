@@ -142,6 +142,6 @@ def test_the_help_pages_need_no_part(command, environ, tmp_path):
 def test_a_command_that_needs_a_missing_part_says_so(command, package, environ, tmp_path):
     process = ja(environ, tmp_path, *command)
     output, _ = process.communicate(timeout=60)
-    assert process.returncode == 1
+    assert process.returncode == 2
     assert output.startswith(f'error: {package} is not installed'), output
     assert output.count('\n') == 1

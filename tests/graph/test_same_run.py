@@ -92,7 +92,7 @@ def run_in_many(folder: Path, draw_ahead: bool) -> DigestRecorder:
             executor.spin_once(timeout_sec=0.1)
             return recorder.has_seen_enough()
 
-        assert Supervisor(graph(draw_ahead), folder, 'stop', print).run(tick) == 0
+        assert Supervisor(graph(draw_ahead), folder).run(tick) == 0
     return recorder
 
 

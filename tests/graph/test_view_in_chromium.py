@@ -8,13 +8,17 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import cv2
 import numpy as np
 import pytest
+from nicegui import __version__
 
 CHROMIUM, DRIVER = shutil.which('chromium'), shutil.which('chromedriver')
 
@@ -25,6 +29,32 @@ pytestmark = [
 
 # Name, width and height [px], and whether it is a phone.
 SCREENS = [('laptop', 1366, 1000, False), ('phone', 390, 844, True)]
+
+
+ATTACK = """<!doctype html><title>another site</title>
+<iframe src="http://ADDRESS/"></iframe>
+<script>
+results = {};
+function note(what, target, good, bad) {
+  target[`on${good}`] = () => results[what] = 'open';
+  target[`on${bad}`] = () => results[what] ??= 'closed';
+}
+const socket = '/_nicegui_ws/socket.io/?EIO=4&transport=websocket';
+note('socket', new WebSocket(`ws://ADDRESS${socket}`), 'open', 'close');
+for (const [tag, path] of [['img', '/favicon.ico'], ['script', 'SCRIPT']]) {
+  const element = document.createElement(tag);
+  note(tag, element, 'load', 'error');
+  element.src = `http://ADDRESS${path}`;
+  document.head.append(element);
+}
+for (const [what, options] of [
+  ['page', {}],
+  ['cookies', {credentials: 'include'}],
+  ['post', {method: 'POST', body: '40'}],
+])
+  fetch('http://ADDRESS/', options)
+    .then(() => results[what] = 'open', () => results[what] = 'closed');
+</script>"""
 
 
 @pytest.fixture
@@ -48,6 +78,47 @@ def demo(domain: int, tmp_path: Path) -> Iterator[tuple[str, int]]:
 
 
 @pytest.fixture
+def page(request, domain: int, tmp_path: Path) -> Iterator[str]:
+    """Serve the page on a host, without a graph; return its address."""
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'ja_dashboard.view_node', '--ros-args', '-p',
+         f'host:={request.param}'],
+        cwd=tmp_path, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    yield process.stdout.readline().split('live page: ')[1].strip()
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode == 0
+
+
+@pytest.fixture
+def foreign_page() -> Iterator[Callable[[str], str]]:
+    """Return a maker of another site's page that uses the page at an address in every way."""
+    pages: dict[str, bytes] = {}
+
+    class Site(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.send_header('Content-Type', 'text/html')
+            self.end_headers()
+            self.wfile.write(pages.get(self.path, b''))
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with ThreadingHTTPServer(('127.0.0.1', 0), Site) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+
+        def make(address: str) -> str:
+            attack = ATTACK.replace('SCRIPT', f'/_nicegui/{__version__}/static/nicegui.js')
+            pages['/attack'] = attack.replace('ADDRESS', urlsplit(address).netloc).encode()
+            return f'http://localhost:{server.server_address[1]}/attack'
+
+        yield make
+        server.shutdown()
+
+
+@pytest.fixture
 def browse() -> Iterator[Callable]:
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
@@ -60,9 +131,10 @@ def browse() -> Iterator[Callable]:
         for flag in (
             'headless=new', 'no-sandbox', 'disable-gpu', 'disable-quic', 'no-first-run',
             'disable-background-networking', 'disable-component-update', 'disable-sync',
-            'hide-scrollbars',
+            'hide-scrollbars', 'host-resolver-rules=MAP evil.example 127.0.0.1',
         ):  # fmt: skip
             options.add_argument(f'--{flag}')
+        options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
         browser = webdriver.Chrome(options=options, service=Service(DRIVER))
         browsers.append(browser)
         screen = {'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': phone}
@@ -101,6 +173,10 @@ def source(browser) -> str:
     return browser.execute_script("return document.images[0]?.src ?? ''")
 
 
+def console_errors(browser) -> list[str]:
+    return [entry['message'] for entry in browser.get_log('browser') if entry['level'] == 'SEVERE']
+
+
 def wait_for_picture(browser) -> None:
     wait(lambda: browser.execute_script('return document.images[0]?.naturalWidth') == 640)
 
@@ -128,6 +204,40 @@ def test_a_viewer_sees_and_controls_the_robot(screen, demo, browse):
     paused = source(browser)
     wait(lambda: 'the simulation is paused' not in text(browser))
     wait(lambda: source(browser) != paused)
+    assert console_errors(browser) == [], "the page's own policy blocks nothing of it"
+
+
+@pytest.mark.parametrize('page', ['127.0.0.1', '0.0.0.0'], indirect=True)
+def test_the_page_is_for_itself_and_for_no_other_site(page, foreign_page, browse):
+    browser = browse(*SCREENS[0][1:])
+    browser.get(page)
+    # The number of seconds comes through the socket.
+    wait(lambda: 'no new image for' in text(browser))
+    assert 'token' not in browser.current_url
+    browser.refresh()
+    wait(lambda: 'no new image for' in text(browser))
+    assert console_errors(browser) == []
+
+    browser.get(foreign_page(page))
+    wait(lambda: browser.execute_script('return Object.keys(results).length') == 6)
+    results = browser.execute_script('return results')
+    assert set(results.values()) == {'closed'}, results
+    browser.switch_to.frame(0)
+    assert 'Joint attention' not in text(browser)
+
+
+@pytest.mark.parametrize('page', ['127.0.0.1'], indirect=True)
+def test_a_name_that_was_rebound_to_this_machine_shows_nothing(page, browse):
+    browser = browse(*SCREENS[0][1:])
+    browser.get(f'http://evil.example:{urlsplit(page).port}/')
+    assert 'not served under that host name' in text(browser)
+
+
+@pytest.mark.parametrize('page', ['0.0.0.0'], indirect=True)
+def test_without_its_token_the_page_shows_nothing(page, browse):
+    browser = browse(*SCREENS[0][1:])
+    browser.get(page.split('?')[0])
+    assert 'needs its token' in text(browser)
 
 
 def test_a_frozen_graph_is_shown_as_stopped(demo, browse):

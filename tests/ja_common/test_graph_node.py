@@ -11,7 +11,8 @@ from std_srvs.srv import Trigger
 
 from ja_common.core.config import Configuration, parameter
 from ja_common.core.health import Level
-from ja_common.graph_node import GraphNode, spin_node
+from ja_common.graph_node import GraphNode
+from ja_common.node_main import spin_node
 from ja_common.topics import DIAGNOSTICS, FIXATION, IMAGE, JOINT_STATES
 from node_bench import joint_state
 
@@ -67,6 +68,53 @@ def test_node_survives_bad_input_and_logs_it_once(bench, capfd, error, text):
     bench.node.on_fixation = lambda message: None
     bench.publish(FIXATION, joint_state(4))
     bench.wait(lambda: bench.node.got)
+
+
+class Ticking(GraphNode):
+    """Calls `on_tick` from a timer, and `on_command` from a subscription of rclpy's own."""
+
+    on_tick = staticmethod(lambda: None)
+    on_command = staticmethod(lambda message, information: None)
+
+    def __init__(self, **node_kwargs):
+        super().__init__('ticking', **node_kwargs)
+        self.ticks = self.commands = 0
+        self.create_timer(0.01, self.tick)
+        self.create_subscription(FIXATION.type, FIXATION.name, self.obey, 10)
+
+    def tick(self):
+        self.ticks += 1
+        self.on_tick()
+
+    def obey(self, message, information):
+        self.commands += 1
+        self.on_command(message, information)
+
+
+@pytest.mark.parametrize('error', [ValueError('the spring is bent'), KeyError('the spring')])
+def test_a_timer_survives_its_error_and_logs_it_once(make_bench, capfd, error):
+    bench = make_bench(Ticking)
+    bench.node.on_tick = fail(error)
+    ticks = bench.node.ticks
+    bench.wait(lambda: bench.node.ticks > ticks + 5)
+    assert 'timer tick: ' in bench.complaint()
+    assert capfd.readouterr().err.count('timer tick: ') == 1
+
+
+def test_a_subscription_of_any_kind_survives_its_error(make_bench, capfd):
+    bench = make_bench(Ticking, publishes=[FIXATION])
+    bench.node.on_command = fail(KeyError('oops'))
+    for stamp_ns in (1, 2, 3):
+        bench.publish(FIXATION, joint_state(stamp_ns))
+    bench.wait(lambda: bench.node.commands == 3)
+    assert "/fixation: KeyError: 'oops'" in bench.complaint()
+    assert capfd.readouterr().err.count('/fixation: KeyError') == 1
+
+
+def test_a_start_is_quiet_while_others_start(make_bench, capfd):
+    bench = make_bench(Listener)
+    bench.wait(lambda: 'no node publishes it' in bench.complaint())
+    assert capfd.readouterr().err == ''
 
 
 def test_diagnostics_hold_name_level_and_figures_at_one_hertz(bench):
@@ -161,11 +209,16 @@ def test_main_ends_quietly_on_a_signal(domain, capfd):
 
 
 def test_main_ends_quietly_when_stopped_while_the_node_is_made(domain, capfd):
+    made = []
+
     def make_node():
-        rclpy.shutdown()  # as SIGINT does
-        return Configured()
+        os.kill(os.getpid(), signal.SIGTERM)
+        made.append(GraphNode('late'))
+        return made[0]
 
     spin_node(make_node)
+    assert made, 'no line of the node was interrupted'
+    assert not rclpy.ok()
     assert capfd.readouterr().err == ''
 
 

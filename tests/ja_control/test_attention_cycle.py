@@ -412,3 +412,12 @@ def test_the_gate_follows_the_evidence():
         wanted = Source.LEARNING_MODULE if p_lm else Source.VISUAL_FEEDBACK
         # The shift under way when the evidence changed was drawn before.
         assert {d.source for d in decisions[10:] if d.phase is Phase.SHIFT} == {wanted}
+
+
+@pytest.mark.parametrize('bad', [np.nan, np.inf, -np.inf])
+def test_a_face_or_a_speed_that_is_not_finite_is_neither_centred_nor_at_rest(bad):
+    for face_delta, velocity in (((bad, 0.0), (0.0, 0.0)), ((0.0, 0.0), (bad, 0.0))):
+        cycle = AttentionCycle(replace(CONFIG, dwell_s=0.0), Gating(GatingConfig()), None)
+        posture = Posture(10**9, np.zeros(2), np.array(velocity))
+        cycle.step(CycleInput(posture, face_delta=np.array(face_delta)))
+        assert cycle.phase is Phase.LOOK

@@ -1,15 +1,17 @@
 """The guard fails closed: no unsafe command passes, and missing input holds the head."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ja_common.core.config import ConfigError
 from ja_common.core.health import Level
-from ja_control.core.command_guard import Cause, CommandGuard, CommandGuardConfig
+from ja_control.core.command_guard import CommandGuard, CommandGuardConfig
+from ja_control.core.hold import Cause
 from ja_control.core.joint_limits import JointLimitsConfig
 
 PERIOD_S = 0.01
@@ -271,6 +273,99 @@ def test_new_limits_wait_until_the_old_ones_have_stopped_the_head():
     assert commands[-1].position[0] == pytest.approx(0.08)
 
 
+def test_while_another_node_commands_the_head_it_brakes_and_then_sends_nothing():
+    rig = Rig()
+    rig.run(0.2, target=(0.7, 0.0))
+    rig.guard.other_commander = '/other publishes'
+    commands = rig.run(0.2, target=(0.7, 0.0))
+    assert {c.hold.level for c in commands} == {Level.ERROR}
+    assert {c.hold.text for c in commands} == {'/other publishes'}
+    sent = [c for c in commands if c.position is not None]
+    assert len(sent) * PERIOD_S == pytest.approx(2.0 / 40.0, abs=2 * PERIOD_S)
+    assert not sent[-1].velocity.any(), 'the last command is at rest'
+    assert all(c.position is None for c in commands[len(sent) :])
+    rig.posture = np.array([-0.3, 0.1])  # turned by the other
+    rig.guard.other_commander = ''
+    again = rig.run(0.5, target=(0.5, 0.0))
+    assert again[0].position == pytest.approx((-0.3, 0.1)), 'no jump'
+    assert again[-1].position == pytest.approx((0.5, 0.0))
+
+
+@pytest.mark.parametrize('held', ['disabled', 'blocked', 'waiting', 'latched'])
+def test_another_commander_is_an_error_and_silences_whatever_else_holds_the_head(held):
+    rig = Rig(latch_faults=True)
+    if held != 'waiting':
+        rig.run(0.2, target=(0.5, 0.0))
+    if held == 'disabled':
+        rig.guard.enable(False)
+    elif held == 'blocked':
+        rig.guard.blocked = 'a reason'
+    elif held == 'latched':
+        rig.images = False
+        rig.run(0.3)
+        rig.images = True
+    rig.guard.other_commander = '/other publishes'
+    command = rig.run(0.2)[-1]
+    assert (command.position, command.hold.level) == (None, Level.ERROR)
+    assert command.hold.cause is Cause.OTHER_COMMANDER
+
+
+NOT_FINITE = (math.nan, math.inf, -math.inf)
+
+
+@pytest.mark.parametrize('bad', NOT_FINITE)
+@pytest.mark.parametrize('what', ['image_age_s', 'joints_age_s', 'now_s'])
+def test_a_time_that_is_not_finite_is_not_fresh(what, bad):
+    """From the start it moves nothing; later it stops the head; and its end lets it move again."""
+    rig = Rig()
+    good = getattr(rig, what)
+    setattr(rig, what, bad)
+    assert all(c.position is None and c.hold for c in rig.run(0.2, target=(0.7, 0.0)))
+    setattr(rig, what, good)
+    rig.run(0.2, target=(0.7, 0.0))
+    setattr(rig, what, bad)
+    stopping = rig.run(0.4, target=(0.7, 0.0))
+    assert stopping[-1].hold is not None
+    assert stopped_after_s(stopping) <= 2.0 / 40.0 + 4 * PERIOD_S
+    setattr(rig, what, good + 1.0 if what == 'now_s' else good)
+    assert rig.run(0.6, target=(0.7, 0.0))[-1].position == pytest.approx((0.7, 0.0))
+
+
+@given(st.sampled_from(NOT_FINITE), st.sampled_from(['image', 'joints', 'step']), st.booleans())
+def test_one_clock_reading_that_is_not_finite_moves_nothing_until_all_inputs_are_new(
+    bad, where, with_age
+):
+    rig = Rig()
+    rig.run(0.3, target=(0.2, 0.0))
+    age_s = bad if with_age else 0.0
+    if where == 'image':
+        rig.guard.record_image(bad, age_s)
+    elif where == 'joints':
+        rig.guard.record_joints(rig.posture, bad, age_s)
+    else:
+        rig.guard.step(bad)
+    rig.images = rig.joints = False
+    assert all(c.hold is not None for c in rig.run(0.05))
+    rig.images = True
+    assert all(c.hold is not None for c in rig.run(0.05))
+    rig.joints = True
+    assert rig.run(0.2)[-1].hold is None
+
+
+@pytest.mark.parametrize('period_s', [*NOT_FINITE, 0.0, -0.01])
+def test_a_period_that_is_no_time_is_refused(period_s):
+    with pytest.raises(ValueError, match='control period'):
+        CommandGuard(LIMITS, CONFIG, period_s)
+
+
+@pytest.mark.parametrize('config_class', [JointLimitsConfig, CommandGuardConfig])
+def test_a_limit_that_is_not_finite_is_refused(config_class):
+    for each in fields(config_class):
+        for bad in NOT_FINITE if isinstance(each.default, float) else ():
+            with pytest.raises(ConfigError, match=each.name):
+                config_class(**{each.name: bad})
+
+
 # Actions on a guard and on the world around it.
 anything = st.floats(allow_nan=True, allow_infinity=True)
 angle = st.one_of(st.floats(-2.0, 2.0), anything)
@@ -284,10 +379,12 @@ action = st.one_of(
     st.tuples(st.just('image'), seconds),
     st.tuples(st.just('steps'), st.integers(1, 12)),
     st.tuples(st.just('clock'), st.floats(-5.0, 5.0)),
+    st.tuples(st.just('bad_clock'), st.sampled_from(NOT_FINITE)),
     st.tuples(st.just('enable'), st.booleans()),
     st.tuples(st.just('restart_guard')),
     st.tuples(st.just('replace')),
     st.tuples(st.just('block'), st.sampled_from(['', 'waiting'])),
+    st.tuples(st.just('other'), st.sampled_from(['', '/other publishes'])),
     st.tuples(
         st.just('limits'), st.floats(0.1, 4.0), st.floats(1.0, 100.0), st.floats(0.3, 1.5)
     ),
@@ -324,7 +421,7 @@ class History:
     def _no_fault(self, target):
         """Run some periods without a fault: the head follows, and images come."""
         self.guard.enable(True)
-        self.guard.blocked = ''
+        self.guard.blocked = self.guard.other_commander = ''
         for _ in range(3):
             if self.position is not None:
                 self._joints(tuple(self.position), 0.0)
@@ -340,6 +437,11 @@ class History:
     def _clock(self, seconds):
         self.now_s += seconds
 
+    def _bad_clock(self, now_s):
+        command = self.guard.step(now_s)
+        self.position = command.position
+        self.rows.append((command, self.measured, len(self.limits)))
+
     def _enable(self, enabled):
         self.guard.enable(enabled)
 
@@ -348,6 +450,9 @@ class History:
 
     def _block(self, text):
         self.guard.blocked = text
+
+    def _other(self, text):
+        self.guard.other_commander = text
 
     def _limits(self, speed, acceleration, room):
         changed = replace(
@@ -376,6 +481,7 @@ class History:
 
 
 NOWHERE = np.full(2, np.nan)
+OTHER = Cause.OTHER_COMMANDER
 
 
 def check_commands(history):
@@ -422,6 +528,9 @@ def check_commands(history):
     assert np.all(np.abs(np.diff(velocity, axis=0)) <= step[1:] + 1e-9, axis=1)[on].all()
     was = np.maximum(np.maximum(low[1:] - position[:-1], position[:-1] - high[1:]), 0.0)
     assert np.all(outside[1:] <= was + 1e-9, axis=1)[on].all()
+    others = np.array([c.hold is not None and c.hold.cause is OTHER for c in commands])
+    at_rest = others[1:] & ~velocity[:-1].any(axis=1)
+    assert not sent[1:][at_rest].any(), 'nothing is sent while another node commands the head'
     slower = np.all(np.abs(velocity[1:]) <= np.abs(velocity[:-1]), axis=1)
     assert slower[on & braking[1:]].all(), 'a hold brakes'
 
@@ -458,10 +567,12 @@ def random_action(rng):
         'image': lambda: (number(1.0),),
         'steps': lambda: (int(rng.integers(1, 13)),),
         'clock': lambda: (rng.uniform(-5.0, 5.0),),
+        'bad_clock': lambda: (float(rng.choice(NOT_FINITE)),),
         'enable': lambda: (bool(rng.integers(2)),),
         'restart_guard': tuple,
         'replace': tuple,
         'block': lambda: (('', 'waiting')[rng.integers(2)],),
+        'other': lambda: (('', '/other publishes')[rng.integers(2)],),
         'limits': lambda: tuple(rng.uniform((0.1, 1.0, 0.3), (4.0, 100.0, 1.5))),
     }
     kind = 'no_fault' if rng.random() < 0.3 else list(kinds)[rng.integers(len(kinds))]

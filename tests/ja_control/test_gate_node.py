@@ -2,17 +2,21 @@
 
 import math
 import time
+from contextlib import ExitStack
 from functools import partial
 
 import numpy as np
 import pytest
+import rclpy
+from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import String
+from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 
 from ja_common.core.config import ConfigError
 from ja_common.core.health import Level
 from ja_common.point_cloud_codec import encode_columns
+from ja_common.private_context import private_context
 from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import (
     CLOCK,
@@ -320,8 +324,43 @@ def test_count_of_trials_is_kept_over_a_restart(make_graph, tmp_path):
         graph.image({FACE_DELTA: (0.0, 0.0)})
     trials = int(graph.status()[1]['trials'])
     assert trials > 41
+    graph.bench.wait(lambda: path.read_text() == f'{trials}\n')
+    graph.bench.wait(lambda: [each.name for each in tmp_path.iterdir()] == ['trials'])
+
+
+def test_a_count_that_cannot_be_saved_takes_no_answer_and_is_saved_later(make_graph, tmp_path):
+    path = tmp_path / 'kept' / 'trials'
+    parameters = {'dwell_s': 0.0, 'max_shifts': 1, 'settle_timeout_s': 0.05}
+    graph = make_graph(trials_file=str(path), **parameters)
+    graph.bench.wait(path.exists)
+    path.unlink()
+    path.parent.rmdir()
+    path.parent.write_text('a file in the place of the folder')
+    for _ in range(6):
+        graph.image({FACE_DELTA: (0.0, 0.0)})
+    trials = int(graph.status()[1]['trials'])
+    assert trials > 1
+    for _ in range(2):  # again and again, as long as it lasts
+        graph.bench.wait_for_complaint(f'trials_file: not saved: {path} cannot be written')
+        graph.bench.node.health.clear_problem('trials_file')
+    path.parent.unlink()
+    graph.bench.wait(path.exists)
     assert path.read_text() == f'{trials}\n'
-    assert [each.name for each in tmp_path.iterdir()] == ['trials']
+    graph.bench.wait(lambda: 'trials_file' not in graph.bench.complaint())
+
+
+def test_an_error_in_the_decision_takes_no_answer_away(make_graph, monkeypatch):
+    graph = make_graph()
+    graph.image()
+
+    def fail(_):
+        raise OSError(28, 'No space left on device')
+
+    with monkeypatch.context() as broken:
+        broken.setattr(graph.bench.node._cycle, 'step', fail)
+        graph.image()
+        graph.bench.wait_for_complaint('No space left on device')
+    graph.image()
 
 
 def test_heads_side_by_side_count_their_trials_apart(make_bench, tmp_path):
@@ -478,3 +517,122 @@ def test_image_of_another_time_holds_the_head(real_time, age_s, text):
     rig = real_time(hold_after_s=5.0)
     rig.images(lambda: text in rig.reason(), age_s=age_s)
     assert not rig.bench.messages(JOINT_COMMANDS), 'nothing was ever commanded'
+
+
+def publish_as_peer(topic):
+    """Return a function that publishes a topic beside the gate, and returns how to end it."""
+
+    def start(bench):
+        publisher = bench.peer.create_publisher(topic.type, topic.name, 10)
+        return lambda: bench.peer.destroy_publisher(publisher)
+
+    return start
+
+
+def publish_from_elsewhere(kind):
+    """As `publish_as_peer`, from another participant, as another process would."""
+
+    def start(bench):
+        ending = ExitStack()
+        domain_id = bench.node.context.get_domain_id()
+        context = ending.enter_context(private_context(domain_id=domain_id))
+        node = rclpy.create_node('wheels', context=context)
+        ending.callback(node.destroy_node)
+        node.create_publisher(kind, JOINT_COMMANDS.name, 10)
+        return ending.close
+
+    return start
+
+
+def run_second_gate(bench, **parameters):
+    overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+    second = GateNode(context=bench.node.context, parameter_overrides=overrides)
+    bench.executor.add_node(second)
+
+    def end():
+        bench.executor.remove_node(second)
+        second.destroy_node()
+
+    return end
+
+
+@pytest.mark.parametrize(
+    ('start', 'name', 'output'),
+    [
+        (publish_as_peer(JOINT_COMMANDS), '/peer', 'joint_state'),
+        (publish_from_elsewhere(JOINT_COMMANDS.type), '/wheels', 'joint_state'),
+        (publish_from_elsewhere(Float64MultiArray), '/wheels', 'joint_state'),
+        (run_second_gate, 'another /gate', 'joint_state'),
+        (publish_as_peer(JOINT_TRAJECTORY), '/peer', 'joint_trajectory'),
+        (publish_as_peer(FORWARD_COMMANDS), '/peer', 'float64_multi_array'),
+    ],
+    ids=['same process', 'elsewhere', 'other type', 'second gate', 'trajectory', 'forward'],
+)
+def test_no_command_is_sent_while_another_node_commands_the_head(real_time, start, name, output):
+    rig = real_time(hold_after_s=5.0, stall_after_s=5.0, output=output)
+    bench, commands = rig.bench, rig.bench.messages(JOINT_COMMANDS)
+    rig.images(lambda: rig.pan < -0.1)
+    end = start(bench)
+    rig.images(lambda: f'is published by {name} as well' in rig.reason())
+    assert bench.messages(GATE_STATUS)[-1].level == bytes([Level.ERROR])
+    report = bench.node.health.report(time.monotonic())
+    assert report.level is Level.ERROR
+    assert f'is published by {name} as well' in report.message
+    statuses = len(bench.messages(GATE_STATUS))
+    rig.images(lambda: len(bench.messages(GATE_STATUS)) >= statuses + 3)
+    commands.clear()
+    rig.pan = 0.3  # turned by the other
+    known = bench.received(JOINT_STATES)
+    rig.images(lambda: bench.received(JOINT_STATES) > known + 2)
+    rig.images(lambda: len(bench.messages(GATE_STATUS)) >= statuses + 6)
+    assert not commands, 'not even the posture at which it stopped'
+    end()
+    rig.images(lambda: commands)
+    assert commands[0].position[0] == pytest.approx(0.3, abs=40.0 / RATE_HZ**2), 'no jump'
+    rig.images(lambda: rig.pan < 0.2)
+    assert not rig.reason()
+
+
+def test_other_topics_and_other_heads_have_commanders_of_their_own(make_bench, ros_context):
+    """A gate with a namespace or a remap guards the topic that it publishes, and no other."""
+    remapped = ['--ros-args', '-r', '__ns:=/left', '-r', 'joint_commands:=wheel']
+    bench = make_bench(partial(GateNode, cli_args=remapped))
+    publish = bench.peer.create_publisher
+    for free in ('joint_commands', 'left/joint_commands', 'wheel'):
+        publish(JOINT_COMMANDS.type, free, 10)
+    bench.wait(lambda: bench.node.count_publishers('/wheel') == 1)
+    bench.wait_for_complaint('no joint state yet')
+    assert 'published by' not in bench.complaint()
+    publish(JOINT_COMMANDS.type, '/left/wheel', 10)
+    bench.wait_for_complaint('/left/wheel is published by /peer as well')
+
+
+def test_two_gates_in_lockstep_both_answer_with_the_measured_posture(make_graph):
+    """The sim waits for an answer, and two different ones would pull the head to and fro."""
+    graph = make_graph()
+    graph.image()
+    graph.image()
+    parameters = {'lockstep': True, 'use_sim_time': True, 'max_acceleration_rad_s2': 1e4}
+    end = run_second_gate(graph.bench, **parameters)
+    graph.bench.wait(lambda: graph.bench.node.count_publishers(JOINT_COMMANDS.name) == 2)
+    commands = graph.bench.messages(JOINT_COMMANDS)
+    graph.image(follow=False)
+    answered = len(commands)
+    for pan in (0.1, 0.12, -0.2):
+        graph.pan = pan
+        graph.image(follow=False)
+        assert commands[-1].position[0] == pytest.approx(pan)
+    assert {round(command.position[0], 6) for command in commands[answered:]} <= {0.1, 0.12, -0.2}
+    status, values = graph.status()
+    assert status.level == bytes([Level.ERROR])
+    assert values['reason'] == '/joint_commands is published by another /gate as well'
+    end()
+    assert graph.image().position[0] == pytest.approx(-0.2), 'no jump'
+    assert graph.image().position[0] == pytest.approx(-0.2 - SPEED * PERIOD_NS / 1e9)
+
+
+def test_nothing_holds_at_the_start_before_our_own_publisher_is_discovered(graph):
+    """From its first image on: the count of publishers must hold our own from the beginning."""
+    for _ in range(5):
+        graph.image()
+        assert 'reason' not in graph.status()[1]

@@ -64,3 +64,13 @@ def test_braking_stops_within_the_acceleration():
         assert profile.velocity > 0.0
         profile.brake()
     assert profile.velocity == 0.0
+
+
+@pytest.mark.parametrize('target', [np.nan, np.inf, -np.inf])
+def test_a_target_that_is_not_finite_brakes(target):
+    profile = MotionProfile(PERIOD_S, SPEED, ACCELERATION)
+    run(profile, 1.0, 20)
+    positions, velocities = run(profile, target, 10)
+    assert np.isfinite(positions).all()
+    assert np.all(np.diff(velocities) <= 0.0)
+    assert velocities[-1] == 0.0

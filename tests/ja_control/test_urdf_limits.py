@@ -1,10 +1,13 @@
 """Limits from a URDF: the narrower ones hold; contradictions are refused."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ja_control.core.joint_limits import JointLimitsConfig
-from ja_control.core.urdf_limits import narrow_limits, read_joint
+from ja_control.core.urdf_limits import LARGEST_URDF, narrow_limits, read_joint
 
 PLAIN = (np.ones(2), np.zeros(2))
 
@@ -57,3 +60,37 @@ def test_axis_is_that_in_the_frame_of_the_root():
 def test_unusable_urdf_is_refused_in_one_sentence(text, complaint):
     with pytest.raises(ValueError, match=complaint):
         limits_of(text)
+
+
+@pytest.mark.parametrize('wrong', ['low', 'high', 'max_speed', 'axis'])
+def test_a_limit_that_is_nan_is_not_taken_for_no_limit(wrong):
+    pan, tilt = (read_joint(urdf(), name) for name in ('pan', 'tilt'))
+    nan = np.full(3, math.nan) if wrong == 'axis' else math.nan
+    for joints in ((replace(pan, **{wrong: nan}), tilt), (pan, replace(tilt, **{wrong: nan}))):
+        with pytest.raises(ValueError, match=r'nan|not a rising pair'):
+            narrow_limits(JointLimitsConfig(), *joints, *PLAIN)
+
+
+LAUGHS = '<!DOCTYPE robot [<!ENTITY a "ha">' + ''.join(
+    f'<!ENTITY {chr(98 + n)} "{f"&{chr(97 + n)};" * 10}">' for n in range(9)
+)
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        f'{LAUGHS}]><robot>&j;</robot>',
+        '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot>&x;</robot>',
+        '<!DOCTYPE robot SYSTEM "http://nowhere.invalid/x.dtd"><robot/>',
+        '<robot>&x;</robot>',
+        '<robot>' * 10**5,
+        '<robot>\0</robot>',
+        '',
+        ' ' * (LARGEST_URDF + 1),
+    ],
+    ids=lambda text: text[:25],
+)
+def test_no_description_expands_or_reads_a_file(text):
+    with pytest.raises(ValueError, match='the robot description') as refused:
+        read_joint(text, 'pan')
+    assert '\n' not in str(refused.value)

@@ -2,11 +2,23 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
 
 import cv2
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    GetParameterTypes,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_srvs.srv import SetBool, Trigger
 
 from ja_common.core.config import Configuration, parameter
@@ -22,6 +34,7 @@ from ja_common.topics import (
     CAMERA_INFO,
     DETECTIONS,
     DIAGNOSTICS,
+    FACE_IMAGE,
     FIXATION,
     GATE_STATUS,
     IMAGE,
@@ -32,10 +45,10 @@ from ja_common.topics import (
 )
 from ja_dashboard.core.view_model import RunState
 from ja_dashboard.view_node import ViewNode
-from node_bench import header
+from node_bench import header, joint_state
 
 ALWAYS = [GATE_STATUS, FIXATION, SCORE, DIAGNOSTICS]
-WATCHED = [IMAGE, CAMERA_INFO, JOINT_STATES, DETECTIONS, JOINT_COMMANDS, BELIEF]
+WATCHED = [IMAGE, CAMERA_INFO, JOINT_STATES, DETECTIONS, FACE_IMAGE, JOINT_COMMANDS, BELIEF]
 FACE = Detection(Kind.FACE, 0.1, 0.0, 192.0, 120.0, 40.0, 50.0, 0.9)
 FOCAL_PX = 160 / math.tan(math.radians(18))
 
@@ -70,15 +83,21 @@ def wait_for_publishers(bench, topics):
     bench.wait(lambda: all(bench.node.polled_subscriptions[topic].publishers for topic in topics))
 
 
-def publish_image(bench, stamp_ns, detections=(FACE,)):
+def publish_image(bench, stamp_ns, instead=MappingProxyType({})):
+    """Publish all that comes with an image; `instead` has other messages by their topics."""
     head = header(stamp_ns)
-    image = np.full((240, 320, 3), 90, np.uint8)
     joints = JointCodec(JointConfig())
-    bench.publish(CAMERA_INFO, encode_camera_info(head, 320, 240, FOCAL_PX))
-    bench.publish(JOINT_STATES, joints.encode_posture(head, [0.2, -0.1], [0.0, 0.0]))
-    bench.publish(JOINT_COMMANDS, joints.encode_posture(head, [0.3, 0.0]))
-    bench.publish(IMAGE, encode_image(image, head.stamp, 'eye'))
-    bench.publish(DETECTIONS, encode_detections(head, list(detections)))
+    messages = {
+        CAMERA_INFO: encode_camera_info(head, 320, 240, FOCAL_PX),
+        JOINT_STATES: joints.encode_posture(head, [0.2, -0.1], [0.0, 0.0]),
+        JOINT_COMMANDS: joints.encode_posture(head, [0.3, 0.0]),
+        IMAGE: encode_image(np.full((240, 320, 3), 90, np.uint8), head.stamp, 'eye'),
+        DETECTIONS: encode_detections(head, [FACE]),
+    }
+    for topic, message in (messages | dict(instead)).items():
+        if hasattr(message, 'header'):
+            message.header.stamp = head.stamp
+        bench.publish(topic, message)
 
 
 def show_images(bench, is_shown, publish_more=lambda: None):
@@ -146,6 +165,140 @@ def test_the_belief_is_drawn_when_it_comes(bench):
     assert bench.node.frame.scene.belief == pytest.approx(
         np.array([[0.1, 0.0, 0.25], [0.2, 0.1, 0.75]])
     )
+
+
+def test_what_comes_between_the_images_is_shown(bench):
+    watch(bench)
+    show_images(bench, lambda scene: True)
+    columns = {'pan': [0.1], 'tilt': [0.0], 'weight': [1.0]}
+    bench.publish(BELIEF, encode_columns(header(1), columns))
+    bench.wait(lambda: len(bench.node.frame.scene.belief))
+    bench.publish(JOINT_COMMANDS, JointCodec(JointConfig()).encode(header(1), [0.4, 0.1]))
+    bench.wait(lambda: bench.node.frame.scene.command == pytest.approx((0.4, 0.1)))
+
+
+WHEELS = JointState(header=header(1), name=['left', 'right'], position=[1.0, 2.0])
+TOO_MANY = {name: np.zeros(5000) for name in ('pan', 'tilt', 'weight')}
+BAD_MESSAGES = {
+    'wheels': (JOINT_STATES, WHEELS),
+    'joints without numbers': (JOINT_STATES, JointState(name=['pan', 'tilt'])),
+    'joints that are NaN': (JOINT_STATES, joint_state(1, math.nan, 0.0)),
+    'a command to wheels': (JOINT_COMMANDS, WHEELS),
+    'a calibration that is none': (CAMERA_INFO, CameraInfo(k=[-1.0] * 9)),
+    'an unknown encoding': (IMAGE, Image(encoding='32FC1', width=1, height=1, step=4)),
+    'an image without pixels': (IMAGE, Image(encoding='rgb8')),
+    'an image that is cut off': (IMAGE, Image(encoding='rgb8', width=4, height=4, step=12)),
+    'an image for no screen': (
+        IMAGE, encode_image(np.zeros((2, 60_000, 3), np.uint8), header(0).stamp, 'eye')
+    ),
+    'detections of another field': (DETECTIONS, PointCloud2(width=9, height=9)),
+    'detections at no place': (
+        DETECTIONS, encode_detections(header(0), [FACE._replace(u=math.inf)])
+    ),
+    'a face that is none': (FACE_IMAGE, Image(encoding='mono8', width=3, height=3, step=3)),
+    'a belief that is NaN': (
+        BELIEF, encode_columns(header(1), {'pan': [math.nan], 'tilt': [0.0], 'weight': [1.0]})
+    ),
+    'a belief of other fields': (BELIEF, encode_columns(header(1), {'x': [1.0]})),
+    'a belief of too many points': (BELIEF, encode_columns(header(1), TOO_MANY)),
+}  # fmt: skip
+
+
+def test_a_bad_message_costs_one_sentence_and_nothing_else(bench):
+    """Every other image comes with a bad message; the page shows the images between them."""
+    watch(bench)
+    problems, stamps = [], []
+    record_problem = bench.node.health.record_problem
+
+    def keep(where, text, *args, **kwargs):
+        problems.append(text)
+        return record_problem(where, text, *args, **kwargs)
+
+    bench.node.health.record_problem = keep
+
+    def publish(instead):
+        bench.node.note_viewer()
+        stamps.append(5_000_000_000 + len(stamps) * 10_000_000)
+        publish_image(bench, stamps[-1], instead=instead)
+
+    def is_shown_after(stamp_ns):
+        picture = bench.node.frame.picture
+        return picture is not None and picture.stamp_ns > stamp_ns
+
+    for name, (topic, message) in BAD_MESSAGES.items():
+        problems.clear()
+
+        def is_reported(topic=topic, message=message):
+            publish({})
+            publish({topic: message})
+            return any(topic.name in text for text in problems)
+
+        bench.wait(is_reported)
+        assert not [text for text in problems if 'Traceback' in text], name
+        before = stamps[-1]
+
+        def is_over(before=before):
+            publish({})
+            return is_shown_after(before)
+
+        bench.wait(is_over)
+        picture, scene = bench.node.frame.picture, bench.node.frame.scene
+        assert picture.image.shape == (240, 320, 3), name
+        assert scene.command == pytest.approx((0.3, 0.0)), name
+        assert scene.posture == pytest.approx((0.2, -0.1)), name
+
+
+def test_a_status_of_no_level_hides_no_other_in_its_message(bench):
+    odd, gate = status('/odd', b'\x09'), status('/gate', DiagnosticStatus.ERROR, 'stalled')
+    bench.publish(DIAGNOSTICS, DiagnosticArray(status=[odd, gate]))
+    bench.wait(lambda: any(node.node == '/gate' for node in bench.node.frame.node_health))
+    bench.wait_for_complaint("level 9 of '/odd'")
+
+
+def test_a_foreign_score_and_status_count_as_far_as_they_go(bench):
+    bench.publish(GATE_STATUS, status(phase='shift', source='me' * 9999, p_lm='abc'))
+    bench.wait(lambda: bench.node.frame.facts['p(LM)'] == 'abc')
+    bench.publish(SCORE, status(last='success'))
+    bench.wait(lambda: 'success, last 1' in bench.node.frame.facts)
+    bench.publish(GATE_STATUS, status(phase='look', p_lm='0.5'))
+    bench.wait(lambda: 'given up' in bench.node.frame.facts)
+    assert bench.complaint() == 'OK'
+
+
+def test_parameters_of_a_foreign_node_are_refused_with_a_sentence(bench):
+    """It has the name of one of ours, and other parameters."""
+    values = {
+        'gate': [math.nan, 0.0, 1.0, 1.0],
+        'sim': ['many'],
+        'learning_module': [7],
+    }  # fmt: skip
+
+    def answer(name, _, response):
+        response.values = [
+            Parameter('x', value=value).get_parameter_value() for value in values[name]
+        ]
+        return response
+
+    kinds = {
+        'get_parameters': GetParameters, 'set_parameters': SetParameters,
+        'list_parameters': ListParameters, 'describe_parameters': DescribeParameters,
+        'get_parameter_types': GetParameterTypes,
+        'set_parameters_atomically': SetParametersAtomically,
+    }  # fmt: skip
+    for node in values:
+        for kind, service in kinds.items():
+            reply = (
+                partial(answer, node) if service is GetParameters else lambda _, response: response
+            )
+            bench.peer.create_service(service, f'{node}/{kind}', reply)
+    watch(bench)
+    show_images(bench, lambda _: 'limits' in bench.complaint())
+    bench.wait_for_complaint("unusable value of objects: 'many'")
+    bench.wait_for_complaint('unusable value of learner: 7')
+    bench.node.set_remote_parameter('objects', 5)
+    bench.wait_for_complaint('objects: not enough values')
+    assert bench.node.frame.settings == {}
+    assert bench.node.frame.scene.low == pytest.approx(np.radians([-60.0, -35.0]))
 
 
 def test_the_truth_is_received_on_request_only(bench):

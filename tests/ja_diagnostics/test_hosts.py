@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from ja_common.python_command import module_command
 from ja_diagnostics.faults import hosts
 from ja_diagnostics.faults.hosts import (
     CASES,
@@ -41,8 +42,8 @@ def host_that(monkeypatch: pytest.MonkeyPatch):
     return replace_host
 
 
-def test_there_is_a_case_for_the_network_and_one_for_the_segments():
-    assert list(CASES) == ['network', 'segments']
+def test_there_are_cases_for_the_network_an_intruder_and_the_segments():
+    assert list(CASES) == ['network', 'intruder', 'segments']
     assert all(map(callable, CASES.values()))
 
 
@@ -69,9 +70,7 @@ def test_hosts_need_the_right_to_make_namespaces(allowed, monkeypatch):
 def test_a_host_has_a_network_and_mounts_of_its_own(tmp_path):
     unshare, python = host_command('network', tmp_path)[:3], host_command('network', tmp_path)[3:]
     assert unshare == ['unshare', '--net', '--mount']
-    assert python == [
-        sys.executable, '-m', 'ja_diagnostics.faults.hosts', 'network', str(tmp_path)
-    ]  # fmt: skip
+    assert python == module_command('ja_diagnostics.faults.hosts', 'network', str(tmp_path))
 
 
 def test_one_node_runs_in_the_namespaces_of_the_other_host():

@@ -80,7 +80,7 @@ def older_sources(kept: Path) -> None:
         (damage_data, 'damaged'),
         (cut_data, 'damaged'),
         (cut_manifest, 'cannot be read'),
-        (other_manifest, 'damaged'),
+        (other_manifest, 'cannot be read'),
         (older_sources, 'made with other sources'),
     ],
 )

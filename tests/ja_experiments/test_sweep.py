@@ -14,7 +14,9 @@ from ja_common.core.config import ConfigError
 from ja_experiments.datasets.looks import Looks
 from ja_experiments.paper.experiment import Materials
 from ja_experiments.progress_bars import ProgressBars
-from ja_experiments.sweep import Grid, read_grid, run_cell, run_sweep
+from ja_experiments.sweep import _key as cell_key
+from ja_experiments.sweep import run_cell, run_sweep
+from ja_experiments.sweep_grid import Grid, read_grid
 from ja_sim.core.specs import ObjectsSpec
 
 TRIALS = 30_000
@@ -66,7 +68,47 @@ def test_a_grid_is_every_combination_with_every_seed(tmp_path: Path) -> None:
         ('grid: {objects: [1, many]}', "objects = 'many' is a str"),
         ('gird: {}', 'and nothing else'),
         ('reading: first', 'one of all, last'),
-        ('grid: {', 'cannot be read'),
+        ('reading: [all]', 'reading'),
+        ('grid: {', 'not YAML'),
+        ('- 1', 'a table of settings'),
+        ('seeds: null', 'nor a list of seeds'),
+        ('seeds: 0', 'nor a list of seeds'),
+        ('seeds: -3', 'nor a list of seeds'),
+        ('seeds: true', 'nor a list of seeds'),
+        ('seeds: 2.0', 'nor a list of seeds'),
+        ('seeds: []', 'nor a list of seeds'),
+        ('seeds: {a: 1}', 'nor a list of seeds'),
+        ('seeds: 99999999999', 'nor a list of seeds'),
+        ('seeds: [1, x]', "'x' is no whole number"),
+        ('seeds: [1, -1]', '-1 is no whole number'),
+        ('seeds: [1, 1.5]', 'no whole number'),
+        ('seeds: [[1]]', 'no whole number'),
+        ('seeds: [3, 4, 3]', '3 is given twice'),
+        ('grid: [1]', 'no table of parameters'),
+        ('grid: null', 'no table of parameters'),
+        ('grid: 5', 'no table of parameters'),
+        ('grid: {objects: []}', 'objects has no values'),
+        ('grid: {objects: [[1]]}', 'no value for objects'),
+        ('grid: {objects: null}', 'no value for objects'),
+        ('grid: {objects: {a: 1}}', 'no value for objects'),
+        ('grid: {objects: [1, 5, 1]}', '1 is given twice'),
+        ('grid: {objects: [0]}', 'objects = 0 is outside'),
+        ('grid: {objects: [1000000000]}', 'objects = 1000000000 is outside'),
+        ('grid: {learning_rate: [.nan]}', 'not a finite number'),
+        ('grid: {learning_rate: [1.0e+999]}', 'not a finite number'),
+        (f'grid: {{learning_rate: {10**400}}}', 'too large'),
+        ('grid: {taught: [nothing]}', 'taught'),
+        ('grid: {1: [2]}', 'no name of a parameter'),
+        ('grid: {learner: [paper]}', 'learner is no parameter'),
+        ('grid: {objects: 1, objects: 2}', "'objects' is given twice"),
+        (f'seeds: 1000\ngrid: {{objects: {list(range(1, 101))}, max_shifts: [1, 2]}}', 'the most'),
+        ('trials: 0', 'trials = 0 is outside'),
+        ('trials: many', "trials = 'many' is a str"),
+        ('trials: null', 'trials = None'),
+        ('trials: 3.0e+5', 'trials = 300000.0 is a float'),
+        ('scene: 5', 'scene = 5 is an int'),
+        ('scene: [default]', 'scene'),
+        ('a: &a [1]\nb: *a', 'an alias'),
     ],
 )
 def test_a_wrong_grid_is_refused_in_one_sentence(tmp_path: Path, text: str, message: str) -> None:
@@ -75,6 +117,26 @@ def test_a_wrong_grid_is_refused_in_one_sentence(tmp_path: Path, text: str, mess
     with pytest.raises(ConfigError, match=message) as refused:
         read_grid(path)
     assert str(path) in str(refused.value)
+    assert '\n' not in str(refused.value)
+    assert len(str(refused.value)) < 600
+
+
+@pytest.mark.parametrize('damage', ['', '{"objects": ', '[1]', '\0'])
+def test_a_damaged_cell_is_named_with_what_to_do(
+    damage: str, tmp_path: Path, materials: Materials
+) -> None:
+    grid = read_grid(grid_file(tmp_path, seeds=1))
+    for cell in grid.cells:
+        (tmp_path / 'cells').mkdir(exist_ok=True)
+        (tmp_path / 'cells' / f'{cell_key(cell, materials)}.json').write_text(damage)
+    with pytest.raises(ConfigError, match=r'\.json .*: delete the damaged cell'):
+        run_sweep(grid, materials, tmp_path, ProgressBars(), scheduler='tcp://nowhere.invalid:1')
+
+
+def test_an_address_without_a_scheduler_is_named(tmp_path: Path, materials: Materials) -> None:
+    grid = read_grid(grid_file(tmp_path, seeds=1))
+    with pytest.raises(ConfigError, match='no Dask scheduler at nonsense://x'):
+        run_sweep(grid, materials, tmp_path, ProgressBars(), scheduler='nonsense://x')
 
 
 @pytest.mark.slow

@@ -1,7 +1,9 @@
 """Checkpoints: all or nothing on disk, and no file can do harm by being loaded."""
 
+import io
 import os
 import pickle
+import zipfile
 
 import numpy as np
 import pytest
@@ -95,9 +97,52 @@ def foreign_files(path):
     yield 'other npz', lambda: np.savez(path, weights=np.zeros(3))
     yield 'no dictionary', lambda: np.savez(path, description=np.array('[1, 2]'))
     yield 'no JSON', lambda: np.savez(path, description=np.array('hello'))
+    yield 'deep JSON', lambda: np.savez(path, description=np.array('[' * 10**5))
+    yield 'long description', lambda: np.savez(path, description=np.array('{}' + ' ' * 10**5))
+    good = {'description': npy(np.array('{}'))}
+    yield 'raw member', lambda: write_members(path, good | {'weights': b'raw'})
+    yield 'path upwards', lambda: write_members(path, good | {'../weights.npy': npy(1.0)})
+    yield 'absolute path', lambda: write_members(path, good | {'/weights.npy': npy(1.0)})
+    yield 'name of a class', lambda: write_members(path, good | {'__class__.npy': npy(1.0)})
+    yield 'many members', lambda: write_members(path, {f'a{n}.npy': npy(1) for n in range(1001)})
+    yield 'no header', lambda: write_members(path, good | {'weights.npy': b'raw'})
+    yield 'other version', lambda: write_members(path, good | {'a.npy': b'\x93NUMPY\x09\x00'})
+    yield 'lying shape', lambda: write_members(path, good | {'a.npy': lying((10**15,))})
+    yield 'negative shape', lambda: write_members(path, good | {'a.npy': lying((-1,))})
+    yield 'no shape', lambda: write_members(path, good | {'a.npy': lying('x')})
+    yield 'structure', lambda: write_members(path, good | {'a.npy': npy(np.zeros(2, 'f4,i4'))})
+    yield 'dates', lambda: write_members(path, good | {'a.npy': npy(np.zeros(2, 'M8[s]'))})
+    yield 'lying size', lambda: lie_about_size(path)
 
 
-@pytest.mark.parametrize('number', range(9))
+def npy(array) -> bytes:
+    stream = io.BytesIO()
+    np.save(stream, array)
+    return stream.getvalue()
+
+
+def lying(shape) -> bytes:
+    """Return a .npy of one number that claims another shape."""
+    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape!r}}}".ljust(117) + '\n'
+    return b'\x93NUMPY\x01\x00' + len(header).to_bytes(2, 'little') + header.encode() + bytes(8)
+
+
+def write_members(path, members: dict[str, bytes]) -> None:
+    with zipfile.ZipFile(path, 'w') as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+
+
+def lie_about_size(path) -> None:
+    """Write a member whose sizes in the directory are 4 GB."""
+    write_members(path, {'a.npy': npy(1.0)})
+    content = bytearray(path.read_bytes())
+    directory = content.index(b'PK\x01\x02')
+    content[directory + 24 : directory + 28] = b'\xfe\xff\xff\xff'
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize('number', range(24))
 def test_foreign_file_is_refused_in_one_sentence(path, number):
     _what, write = list(foreign_files(path))[number]
     write()
@@ -127,3 +172,22 @@ def test_no_file_fills_the_memory(path, monkeypatch):
         load_checkpoint(path)
     with pytest.raises(ValueError, match='let the learner remember fewer trials'):
         save_checkpoint(path, {'faces': np.zeros(100_000)}, {'learner': 'paper'})
+
+
+@pytest.mark.parametrize('kind', ['pipe', 'device'])
+def test_what_is_no_file_is_refused_without_waiting(path, kind):
+    if kind == 'pipe':
+        os.mkfifo(path)
+    else:
+        path.symlink_to('/dev/zero')
+    with pytest.raises(ValueError, match='is not a checkpoint'):
+        load_checkpoint(path)
+
+
+def test_the_same_array_twice_is_refused(path):
+    with zipfile.ZipFile(path, 'w') as archive:
+        archive.writestr('a.npy', npy(1.0))
+        with pytest.warns(UserWarning, match='Duplicate name'):
+            archive.writestr('a.npy', npy(2.0))
+    with pytest.raises(ValueError, match='there twice'):
+        load_checkpoint(path)

@@ -156,12 +156,12 @@ SPOILED = {
         'does not say how its learner was configured',
     ),
     'other size': (
-        lambda path: spoil_arrays(path, hidden_biases=np.zeros(3)),
-        'hidden_biases must be numbers of shape',
+        lambda path: spoil_arrays(path, hidden_biases=np.zeros(3, np.float32)),
+        'hidden_biases must be float32 of shape (7,), found float32 of shape (3,)',
     ),
     'not a number': (
-        lambda path: spoil_arrays(path, hidden_biases=np.full(7, np.nan)),
-        'hidden_biases holds numbers that are not finite',
+        lambda path: spoil_arrays(path, hidden_biases=np.full(7, np.nan, np.float32)),
+        'hidden_biases must hold numbers from -1e+06 to 1e+06',
     ),
 }
 

@@ -75,3 +75,11 @@ def test_a_glance_is_no_fixation():
     assert [seen(0.6, pan=0.5), seen(0.7, 0.5, (0.3, 0.0)), seen(0.8, 0.5)] == [True, False, False]
     assert not seen(0.2, pan=0.5), 'the clock was set back: it starts again'
     assert seen(0.4, pan=0.5)
+
+
+@pytest.mark.parametrize('bad', [math.nan, math.inf, -math.inf])
+def test_what_is_not_finite_is_never_good_enough(bad):
+    assert NEAREST.find_fixation([ball(0.0)], head(velocity=(bad, 0.0))) is None
+    assert NEAREST.find_fixation([ball(bad)], head()) is None
+    if math.isnan(bad):  # a face so far out that it is infinite is not nearer than the object
+        assert NEAREST.find_fixation([ball(0.0), face(bad)], head()) is None

@@ -351,9 +351,15 @@ def test_a_restored_learner_goes_on_bit_for_bit(learner):
     ('spoil', 'why'),
     [
         (lambda s: s.pop('faces'), 'faces'),
-        (lambda s: s.update({'network.coder.0.weight': np.zeros((1, 1))}), 'must have shape'),
-        (lambda s: s.update({'mean.stretch_logits': np.full((3, 9), np.nan)}), 'not finite'),
-        (lambda s: s.update({'candidate_counts': np.array([7])}), 'do not fit'),
+        (
+            lambda s: s.update({'network.coder.0.weight': np.zeros((1, 1))}),
+            'must be float32 of shape',
+        ),
+        (
+            lambda s: s.update({'mean.stretch_logits': np.full((3, 9), np.nan, np.float32)}),
+            'not finite',
+        ),
+        (lambda s: s.update({'candidate_counts': np.array([7])}), 'candidates must be'),
         (lambda s: s.update({'evidence.nats': np.zeros(9)}), 'evidence'),
     ],
 )

@@ -24,6 +24,7 @@ from ja_common.topics import (
     JOINT_STATES,
     LM_DELTA,
 )
+from ja_learning.core.checkpoint import load_checkpoint
 from ja_learning.core.network import ThreeLayerNetwork
 from ja_learning.core.network_config import NetworkConfig
 from ja_learning.core.trial import Trial
@@ -330,10 +331,28 @@ def test_a_checkpoint_that_cannot_be_written_is_reported_and_learning_goes_on(
     trials = make_trials(checkpoint_folder=str(tmp_path), checkpoint_every_trials=1)
     with full_disk():
         trials.send_trial()
-        trials.send_look()
-        trials.bench.wait_for_complaint('learning: [Errno 28] No space left on device')
+        assert trials.send_look().name  # it answers
+        trials.bench.wait_for_complaint('cannot be written (No space left on device): make room')
+        trials.send_trial()
+    # No trial comes after the disk has room again: the clock saves what was learned.
+    trials.bench.wait(lambda: list(tmp_path.glob('paper-*.npz')))
+    [path] = tmp_path.glob('paper-*.npz')
+    assert load_checkpoint(path)[1]['trials'] == 2
+    trials.bench.wait(lambda: 'cannot be written' not in trials.bench.complaint())
+
+
+def test_a_folder_that_vanished_is_an_error_until_it_can_be_made_again(make_trials, tmp_path):
+    kept = tmp_path / 'kept'
+    trials = make_trials(checkpoint_folder=str(kept), checkpoint_every_trials=1)
+    kept.rename(tmp_path / 'away')
+    kept.write_text('a file in the place of the folder')
     trials.send_trial()
-    assert list(tmp_path.glob('paper-*.npz'))
+    for _ in range(2):  # again and again, with no further trial
+        trials.bench.wait_for_complaint('kept is no folder): remove that, or name another place')
+        trials.bench.node.health.clear_problem('saving')
+    assert trials.send_look().name
+    kept.unlink()
+    trials.bench.wait(lambda: list(kept.glob('paper-*.npz')))
 
 
 def test_what_cannot_be_forgotten_for_good_is_reported(make_trials, tmp_path, full_disk):

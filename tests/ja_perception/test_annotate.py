@@ -5,6 +5,7 @@ import pytest
 
 from ja_common.core.annotate import annotate_image
 from ja_common.core.camera_model import CameraModel
+from ja_common.core.detection import Detection, Kind
 from ja_common.core.posture import Posture
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.detector import SalientFeatureDetector
@@ -41,3 +42,16 @@ def test_draws_on_a_copy_what_was_found(size):
     if percept.face_image is not None:
         inset = drawn[: drawn.shape[0] // 5, -drawn.shape[1] // 8 :]
         assert np.all(inset[..., 0] == inset[..., 1])
+
+
+@pytest.mark.parametrize('size', [(1, 1), (1, 700), (9000, 2), (320, 240)])
+@pytest.mark.parametrize('place', [0.0, -1e12, 1e30])
+def test_draws_what_another_node_claims_to_have_found(size, place):
+    """At any place, of any size, in a picture of any shape; the drawing stays as small as that."""
+    width, height = size
+    picture = np.zeros((height, width, 3), np.uint8)
+    camera = CameraModel.from_field_of_view(width, height, 0.6)
+    found = [Detection(kind, *[place] * 7, 1, place, place, place) for kind in Kind]
+    face = np.zeros((400, 300), np.uint8)
+    drawn = annotate_image(picture, found, face, camera, d_th_rad=0.1, latency_s=0.0)
+    assert max(drawn.shape) < 480 + max(size)

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 import rclpy
 from rclpy.parameter import Parameter
+from rosgraph_msgs.msg import Clock
 
 from ja_common.executor import CachedWaitSetExecutor
 from ja_common.image_codec import decode_image
-from ja_common.topics import CAMERA_INFO, IMAGE
+from ja_common.time_codec import to_ns, to_time
+from ja_common.topics import CAMERA_INFO, CLOCK, IMAGE
 from ja_perception.camera_node import CameraNode
 from ros_testing import spin_until
 
@@ -44,6 +46,19 @@ def test_pictures_and_calibration_come_together(ros_context, tmp_path):
     assert infos[0].k[0] == pytest.approx(32 / math.tan(0.5))
     node.destroy_node()
     listener.destroy_node()
+
+
+def test_pictures_come_while_the_clock_stands_still_and_after_it_was_set_back(
+    make_bench, tmp_path
+):
+    path = tmp_path / 'still.png'
+    cv2.imwrite(str(path), np.zeros((8, 8, 3), np.uint8))
+    parameters = {'source': str(path), 'rate_hz': 100.0, 'use_sim_time': True}
+    bench = make_bench(CameraNode, [CLOCK], [IMAGE], **parameters)
+    for now_ns in (7200 * 10**9, 3600 * 10**9):
+        bench.publish(CLOCK, Clock(clock=to_time(now_ns)))
+        bench.wait(lambda now_ns=now_ns: to_ns(bench.next(IMAGE).header.stamp) == now_ns)
+        assert to_ns(bench.next(IMAGE, 3).header.stamp) == now_ns
 
 
 def test_source_that_cannot_be_opened_ends_the_node_with_one_sentence(ros_context):

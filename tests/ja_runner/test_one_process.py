@@ -70,5 +70,5 @@ def test_a_signal_ends_it_cleanly(listener):
 def test_a_bad_parameter_gives_one_sentence(listener):
     reports: list[str] = []
     bad = NodeSpec('dummy_nodes', 'talker', {'text': 'bad'})
-    assert run_in_one_process([*GRAPH, bad], listener, within(lambda: False), reports.append) == 1
+    assert run_in_one_process([*GRAPH, bad], listener, within(lambda: False), reports.append) == 2
     assert reports == ['error: talker: parameter text = bad cannot be used']

@@ -2,6 +2,7 @@
 
 import io
 
+import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rich.console import Console
 
@@ -53,6 +54,28 @@ def test_without_a_terminal_a_plain_line_is_printed(make_bench):
     assert second == '[ERROR] [gate]: [not markup]'
 
 
+class FailingOutput(io.StringIO):
+    """An output that fails with this error."""
+
+    def __init__(self, error: OSError) -> None:
+        super().__init__()
+        self._error = error
+
+    def flush(self) -> None:
+        raise self._error
+
+
+@pytest.mark.parametrize(
+    ('error', 'gone'), [(OSError(28, 'No space left on device'), False), (BrokenPipeError(), True)]
+)
+def test_a_run_outlives_an_output_that_cannot_be_written(make_bench, error, gone):
+    node = make_bench(ProgressNode).node
+    with Display('title', Console(file=FailingOutput(error))) as display:
+        display.update(node)
+        display.print_line('a line')
+        assert display.reader_has_gone is gone
+
+
 def test_on_a_terminal_a_table_lives(make_bench):
     node = make_bench(ProgressNode).node
     text = io.StringIO()
@@ -60,3 +83,12 @@ def test_on_a_terminal_a_table_lives(make_bench):
         display.update(node)
     assert 'the title' in text.getvalue()
     assert 'waiting for the first image' in text.getvalue()
+
+
+def test_what_another_node_writes_is_no_markup(make_bench):
+    node = make_bench(ProgressNode).node
+    node.warnings['/their_node'] = 'expected [/open] before [bold]'
+    text = io.StringIO()
+    with Display('the title', Console(file=text, force_terminal=True, width=90)) as display:
+        display.update(node)
+    assert 'expected [/open] before [bold]' in text.getvalue()

@@ -1,12 +1,15 @@
 """Supervised processes: they start, publish, die, and never stay behind."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -14,13 +17,15 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 from ja_common.executor import CachedWaitSetExecutor
+from ja_runner import node_process
 from ja_runner.node_spec import NodeSpec
-from ja_runner.supervisor import Supervisor
+from ja_runner.supervisor import Supervision, Supervisor
 
 pytestmark = pytest.mark.usefixtures('domain')
 
 TALKER = NodeSpec('dummy_nodes', 'talker')
 CRASHER = NodeSpec('dummy_nodes', 'talker', {'text': 'crash'})
+HANGING = NodeSpec('dummy_nodes', 'talker', {'text': 'hang'})
 STUBBORN = NodeSpec('dummy_nodes', 'stubborn')
 
 
@@ -41,9 +46,9 @@ def alive(pid: int) -> bool:
 class SupervisedRun:
     """A supervisor in this process, with its reports and all process ids that it has started."""
 
-    def __init__(self, graph: list[NodeSpec], folder: Path, **options: object) -> None:
+    def __init__(self, graph: list[NodeSpec], folder: Path, **options: Any) -> None:
         self.reports: list[str] = []
-        self.supervisor = Supervisor(graph, folder, report=self.reports.append, **options)
+        self.supervisor = Supervisor(graph, folder, Supervision(**options), self.reports.append)
         self.pids: set[int] = set()
 
     def until(self, condition: Callable[[], object], timeout_s: float = 15.0) -> int:
@@ -96,6 +101,26 @@ def test_when_one_dies_the_rest_is_stopped_and_the_death_explained(tmp_path):
     assert not any(map(alive, run.pids))
 
 
+def test_a_log_folder_that_vanishes_ends_no_graph(tmp_path):
+    folder = tmp_path / 'log'
+    run = SupervisedRun([TALKER], folder, on_death='restart')
+    killed: list[int] = []
+
+    def replaced_without_a_log() -> bool:
+        pid = run.supervisor.pids['talker']
+        if not killed:
+            (folder / 'talker.log').unlink()
+            folder.rmdir()
+            folder.write_text('a file in the place of the folder')
+            os.kill(pid, signal.SIGKILL)
+            killed.append(pid)
+        return pid != killed[0] and alive(pid)
+
+    assert run.until(replaced_without_a_log) == 0
+    assert folder.is_file()
+    assert not any(map(alive, run.pids))
+
+
 def test_a_killed_node_is_restarted_when_asked_to(tmp_path):
     run = SupervisedRun([TALKER], tmp_path, on_death='restart')
     first: list[int] = []
@@ -112,6 +137,71 @@ def test_a_killed_node_is_restarted_when_asked_to(tmp_path):
     assert not any(map(alive, run.pids))
 
 
+@pytest.mark.parametrize('hang', ['stopped', 'in a callback'])
+def test_a_hung_node_is_killed_and_replaced(hang, tmp_path):
+    spec = TALKER if hang == 'stopped' else HANGING
+    run = SupervisedRun([spec], tmp_path, on_death='restart', hung_after_s=2.0)
+    first: list[int] = []
+
+    def replaced() -> bool:
+        (process,) = run.supervisor._processes
+        if process.beats and not first:
+            first.append(process.popen.pid)
+            if hang == 'stopped':
+                process.send_signal(signal.SIGSTOP)
+        return bool(first) and process.popen.pid != first[0]
+
+    assert run.until(replaced, timeout_s=60.0) == 0
+    assert re.search(
+        r'talker was hung, without a heartbeat for \d+ s, and was killed', run.reports[0]
+    )
+    assert ('in publish_text' in run.reports[0]) == (hang == 'in a callback'), 'where it hung'
+    assert not any(map(alive, run.pids))
+
+
+def test_a_hung_node_ends_a_graph_that_restarts_nothing(tmp_path):
+    run = SupervisedRun([HANGING], tmp_path, hung_after_s=2.0)
+    assert run.until(lambda: False, timeout_s=60.0) == 1
+    assert 'was hung' in run.reports[0]
+    assert not any(map(alive, run.pids))
+
+
+def test_a_node_that_never_comes_to_life_is_hung(tmp_path, monkeypatch):
+    monkeypatch.setattr(node_process, 'START_LIMIT_S', 2.0)
+    run = SupervisedRun([STUBBORN], tmp_path)
+    assert run.until(lambda: False, timeout_s=60.0) == 1
+    assert 'stubborn was hung' in run.reports[-1]
+    assert not any(map(alive, run.pids))
+
+
+def test_a_node_of_another_package_may_be_without_a_heartbeat(tmp_path, monkeypatch):
+    monkeypatch.setattr(node_process, 'START_LIMIT_S', 1.0)
+    other = replace(STUBBORN, has_heartbeat=False)
+    run = SupervisedRun([other], tmp_path, patience_s=0.3)
+    end = time.monotonic() + 3.0
+    assert run.until(lambda: time.monotonic() > end) == 0
+
+
+def test_a_halt_of_the_supervisor_makes_no_node_hung(tmp_path):
+    run = SupervisedRun([TALKER], tmp_path, hung_after_s=3.0)
+    ticks = 0
+
+    def halted_with_its_nodes() -> bool:
+        nonlocal ticks
+        (process,) = run.supervisor._processes
+        if process.beats and ticks == 0:
+            ticks = 1
+            pid = process.popen.pid
+            os.kill(pid, signal.SIGSTOP)
+            time.sleep(4.0)
+            os.kill(pid, signal.SIGCONT)
+        ticks += ticks > 0
+        return ticks > 50
+
+    assert run.until(halted_with_its_nodes, timeout_s=60.0) == 0
+    assert run.reports == []
+
+
 def test_a_node_that_dies_at_every_start_is_given_up(tmp_path):
     run = SupervisedRun([CRASHER], tmp_path, on_death='restart')
     assert run.until(lambda: False) == 1
@@ -123,7 +213,7 @@ def test_a_node_that_dies_at_every_start_is_given_up(tmp_path):
 def test_a_node_that_ignores_signals_is_killed_in_the_end(tmp_path):
     run = SupervisedRun([STUBBORN], tmp_path, patience_s=0.3)
     assert run.until(lambda: 'here I stand' in run.log('stubborn', tmp_path)) == 0
-    assert run.reports[-2:] == [
+    assert [line for line in run.reports if 'did not end' in line] == [
         'stubborn did not end on SIGINT', 'stubborn did not end on SIGTERM'
     ]  # fmt: skip
     assert not any(map(alive, run.pids))
@@ -154,10 +244,13 @@ def test_a_bad_parameter_gives_one_sentence(tmp_path):
 SUPERVISING = """
 import sys, time
 from pathlib import Path
+from ja_runner import node_process
 from ja_runner.node_spec import NodeSpec
-from ja_runner.supervisor import Supervisor
+from ja_runner.supervisor import Supervision, Supervisor
 graph = [NodeSpec('dummy_nodes', 'talker'), NodeSpec('dummy_nodes', 'stubborn')]
-supervisor = Supervisor(graph, Path(sys.argv[1]), report=lambda _: None, patience_s=0.3)
+supervisor = Supervisor(
+    graph, Path(sys.argv[1]), Supervision(patience_s=0.3), report=lambda _: None
+)
 shown = False
 def tick():
     global shown

@@ -1,5 +1,7 @@
 """Scenes: the shipped ones load, and an error names the file and line."""
 
+import os
+
 import pytest
 
 from ja_common.core.config import ConfigError
@@ -75,3 +77,54 @@ def test_unknown_names_and_missing_files_are_told(tmp_path):
 def test_values_from_python_are_checked_too():
     with pytest.raises(ConfigError, match='backlash_deg'):
         HeadSpec(backlash_deg=-1.0)
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        'a: &a [x]\nb: [*a, *a]',
+        b'name: \xff',
+        'name: \0',
+        'objects: ' + '[' * 3000,
+        'objects:\n  count: 3\n  count: 4',
+        'objects:\n  count: ' + '9' * 5000,
+        'objects:\n  count: 1.0e+999',
+        'objects:\n  count: null',
+        'objects:\n  count: [[[1]]]',
+        'objects:\n  pan_deg: [.nan, .inf]',
+        'objects: [1]',
+        'objects: null',
+        '- 1',
+        'head: [ideal]',
+        'head:\n  preset: [ideal]',
+        'head:\n  preset: {a: b}',
+        '? [a]\n: 1',
+        'x' * 10**5 + ': 1',
+        'name: ' + '[' + 'x, ' * 10**4 + ']',
+        'name: !!python/name:os.system',
+        'name: 2026-99-99',
+        '#' * (2**20 + 1),
+    ],
+    ids=lambda text: repr(text[:30]),
+)
+def test_no_file_breaks_the_reader(text, tmp_path):
+    path = tmp_path / 'hostile.yaml'
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(SceneError) as refused:
+        load_scene(str(path))
+    assert str(refused.value).startswith(str(path))
+    assert '\n' not in str(refused.value)
+    assert len(str(refused.value)) < 500
+
+
+@pytest.mark.parametrize('kind', ['folder', 'device', 'pipe'])
+def test_what_is_no_file_is_refused(kind, tmp_path):
+    path = tmp_path / 'x.yaml'
+    if kind == 'folder':
+        path.mkdir()
+    elif kind == 'device':
+        path.symlink_to('/dev/zero')
+    else:
+        os.mkfifo(path)
+    with pytest.raises(SceneError, match='is needed'):
+        load_scene(str(path))

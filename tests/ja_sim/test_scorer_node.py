@@ -110,8 +110,8 @@ def test_every_trial_is_a_row_on_disk_at_once(make_course, tmp_path):
         course.image(trial, fixation)
     course.image(trial=4)
     course.score_after(3)
-    with path.open() as file:
-        rows = list(csv.DictReader(file))
+    course.bench.wait(lambda: len(rows_of(path)) == 3)
+    rows = rows_of(path)
     assert [row['trial'] for row in rows] == ['1', '2', '3']
     assert [row['success'] for row in rows] == ['1', '0', '0']
     assert [row['stamp_ns'] for row in rows] == ['1200000000', '1300000000', '1400000000']
@@ -121,6 +121,28 @@ def test_every_trial_is_a_row_on_disk_at_once(make_course, tmp_path):
     assert float(rows[1]['fixated_pan_rad']) == pytest.approx(RIGHT[0])
     assert float(rows[1]['fixated_tilt_rad']) == pytest.approx(RIGHT[1])
     assert rows[2]['fixated_pan_rad'] == '', 'given up'
+
+
+def test_a_full_disk_takes_neither_a_score_nor_a_row(make_course, tmp_path):
+    folder, away = tmp_path / 'scores', tmp_path / 'away'
+    path = folder / 'trials.csv'
+    course = make_course(csv_file=str(path))
+    folder.rename(away)
+    folder.write_text('a file in the place of the folder')
+    for trial in (1, 2):
+        course.image(trial, LEFT)
+    course.image(trial=3)
+    assert course.score_after(2)[0] == '2 of 2 trials'
+    course.bench.wait_for_complaint('csv_file: not saved: ')
+    folder.unlink()
+    away.rename(folder)
+    course.bench.wait(lambda: len(rows_of(path)) == 2)  # without a further trial
+    course.bench.wait(lambda: 'csv_file' not in course.bench.complaint())
+
+
+def rows_of(path):
+    with path.open() as file:
+        return list(csv.DictReader(file))
 
 
 def test_reset_counts_from_nought(make_course):

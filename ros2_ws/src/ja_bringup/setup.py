@@ -28,7 +28,7 @@ setup(
     extras_require={'test': ['pytest']},
     entry_points={
         'console_scripts': [
-            'ja = ja_bringup.cli:main',
+            'ja = ja_bringup.__main__:main',
         ],
     },
 )

@@ -1,4 +1,4 @@
-"""`talker`: publishes a parameter's value repeatedly; the value `crash` ends the process."""
+"""`talker`: publishes a parameter's value; `crash` ends the process, `hang` never returns."""
 
 import os
 import sys
@@ -8,7 +8,7 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 from ja_common.core.config import ConfigError
-from ja_common.graph_node import spin_node
+from ja_common.node_main import spin_node
 
 
 class TalkerNode(Node):
@@ -26,6 +26,8 @@ class TalkerNode(Node):
         if self.text == 'crash':
             print('[ERROR] [talker]: the wheel came off', file=sys.stderr, flush=True)
             os._exit(7)
+        while self.text == 'hang':
+            pass
         self.pub.publish(String(data=f'{self.text} from {self.get_fully_qualified_name()}'))
 
 

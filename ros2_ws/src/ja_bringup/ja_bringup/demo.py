@@ -4,23 +4,26 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ja_bringup.course import Course, Stage
+from ja_common.core.learning_curve import LearningCurve
+from ja_common.core.run_folder import new_run_folder
 from ja_runner.node_spec import NodeSpec
 from ja_runner.progress import WINDOW_TRIALS, ProgressNode
-from ja_runner.run import check_memory, new_run_folder, run_graph
-from ja_runner.supervisor import OnDeath
+from ja_runner.run import check_memory, run_graph
+from ja_runner.supervisor import Supervision
 
 
 def run_demo(
     graph: Sequence[NodeSpec],
     stages: Sequence[Stage],
     one_process: bool,
-    on_death: OnDeath,
+    supervision: Supervision,
     arguments: Sequence[str],
     view: bool = False,
     resume: Path | None = None,
 ) -> int:
     """Lead the graph through the stages of a course and print a summary; return the exit code.
 
+    The code is 0 if a trial was finished, also where a signal has ended the run, and all is saved.
     `resume`: the folder of a run whose learner and gate continue from where they ended. Raises
     ConfigError when that folder holds no checkpoint.
     """
@@ -41,19 +44,38 @@ def run_demo(
         over,
         one_process=one_process,
         view=view,
-        on_death=on_death,
+        supervision=supervision,
         arguments=arguments,
         memory=resume,
     )
-    for line in summary(progress, stages):
-        print(line)
+    lines = summary(progress, stages)
     if progress.curve.records:
-        # matplotlib is imported late: before the run it would delay the first node.
-        from ja_bringup.success_curve import draw_png, write_csv
-
-        print(f'success curve: {write_csv(progress.curve, folder)}')
-        print(f'               {draw_png(progress.curve, folder, WINDOW_TRIALS)}')
+        saved, places = save_curve(progress.curve, folder)  # first: printing may fail as well
+        lines += places
+        code = code if saved else 1
+    else:
+        code = code or 1
+    for line in lines:
+        print(line)
     return code
+
+
+def save_curve(curve: LearningCurve, folder: Path) -> tuple[bool, list[str]]:
+    """Write the success curve as CSV and as a picture; return whether, and what to print.
+
+    The rows of a table that cannot be written are printed: nothing else holds them.
+    """
+    # matplotlib is imported late: before the run it would delay the first node.
+    from ja_bringup.success_curve import as_csv, draw_png, write_csv
+
+    lines = []
+    try:
+        lines.append(f'success curve: {write_csv(curve, folder)}')
+        lines.append(f'               {draw_png(curve, folder, WINDOW_TRIALS)}')
+    except OSError as error:
+        table = [] if lines else as_csv(curve).splitlines()
+        return False, [*table, *lines, f'error: {error}']
+    return True, lines
 
 
 def summary(progress: ProgressNode, stages: Sequence[Stage]) -> list[str]:

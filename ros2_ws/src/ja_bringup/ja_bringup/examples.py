@@ -8,7 +8,7 @@ EXAMPLES: dict[str, dict[str, str]] = {
         './ja demo --learner paper --trials 2000 --time 600': "the paper's network needs more",
         './ja demo --scene default --record --one-process': 'a harder scene, all of it recorded',
         './ja demo --resume runs/X-demo': 'resume an earlier run with all that it learned',
-        './ja demo --swap gate=my_lab/my_gate --ros-args -p max_shifts:=3': 'a node of your own',
+        './ja demo --swap gate=my_lab/my_gate --ros-args -p max_shifts:=3': 'a node of yours',
     },
     'rig': {
         './ja rig --source 0': 'a webcam, and a digital head in its picture',

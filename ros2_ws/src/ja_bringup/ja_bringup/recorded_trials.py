@@ -12,10 +12,11 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from ja_common.core.files import check_file_writable, check_writable
 from ja_common.ros_arguments import check_ros_arguments
 from ja_recording.core.dataset import TrialSample, write_dataset
 from ja_recording.core.reader import Recording, warn_of_unfinished
-from ja_recording.learner_score import score_learner, success_rate, write_csv
+from ja_recording.learner_score import ScoredTrial, score_learner, success_rate, write_csv
 from ja_recording.trials import RecordedTrial, recorded_trials
 
 _BLOCK_TRIALS = 50
@@ -24,18 +25,24 @@ _BLOCK_TRIALS = 50
 def score(path: Path, csv_file: Path | None, as_json: bool, arguments: Sequence[str]) -> int:
     """Train a learner on the trials of a recording, print its curve; return the exit code."""
     check_ros_arguments(arguments)
+    if csv_file is not None:
+        check_file_writable(csv_file)
     recording = Recording(path)
     warn_of_unfinished(recording)
     with _bar(recording, path.name) as advance:
         trials = score_learner(recording, arguments, advance)
-    if csv_file is not None:
-        write_csv(trials, csv_file)
     if as_json:
         print(json.dumps([asdict(trial) for trial in trials]))
-        return 0
-    if not trials:
+    elif not trials:
         print('no trial of the recording ended in a fixation')
-        return 0
+    else:
+        _print_curve(trials)
+    if csv_file is not None:  # last: what is printed is not lost if this fails
+        write_csv(trials, csv_file)
+    return 0
+
+
+def _print_curve(trials: Sequence[ScoredTrial]) -> None:
     blocks = Table(title='learner over recorded trials', title_justify='left')
     for name in ('trials', 'off, median [deg]', 'learner succeeds', 'recorded success'):
         blocks.add_column(name)
@@ -45,12 +52,12 @@ def score(path: Path, csv_file: Path | None, as_json: bool, arguments: Sequence[
         rates = [str(success_rate(block, of)) for of in ('success', 'recorded')]
         blocks.add_row(f'{first + 1} - {first + len(block)}', f'{off_deg:.1f}', *rates)
     Console().print(blocks)
-    return 0
 
 
 def export(paths: Sequence[Path], folder: Path, licence: str, arguments: Sequence[str]) -> int:
     """Turn recordings into one data set of trials; return the exit code."""
     check_ros_arguments(arguments)
+    check_writable(folder)
     recordings = {path: Recording(path) for path in paths}
 
     def samples() -> Iterator[TrialSample]:

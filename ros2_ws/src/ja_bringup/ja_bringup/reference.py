@@ -18,6 +18,7 @@ from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 
 from ja_bringup.sros_policy import policy_xml
+from ja_common.core.files import check_writable, write_file
 from ja_common.graph_node import GraphNode
 from ja_common.parameters import UNBOUNDED
 from ja_common.private_context import private_context
@@ -78,15 +79,15 @@ value is refused with the reason and changes nothing; *fixed* parameters are rea
 
 def write_reference(folder: Path) -> list[Path]:
     """Write the pages and the SROS2 policy into a folder; return their paths."""
+    check_writable(folder)
     with every_node((*NODES, *COMPANIONS)) as nodes:
         pages = {
             'topics.md': topics_page(nodes),
             'parameters.md': parameters_page(nodes),
             'sros2_policy.xml': policy_xml(nodes[: len(NODES)]),
         }
-    folder.mkdir(parents=True, exist_ok=True)
     for name, text in pages.items():
-        (folder / name).write_text(text, encoding='utf-8')
+        write_file(folder / name, text)
     return [folder / name for name in pages]
 
 

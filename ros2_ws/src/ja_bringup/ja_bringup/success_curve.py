@@ -1,6 +1,7 @@
 """The success curve of a run, as CSV and as a picture."""
 
 import csv
+import io
 from dataclasses import asdict, fields
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from ja_common.core.files import write_file
 from ja_common.core.learning_curve import LearningCurve, TrialRecord
 
 CSV_NAME = 'success_curve.csv'
@@ -16,17 +18,26 @@ PNG_NAME = 'success_curve.png'
 
 
 def write_csv(curve: LearningCurve, folder: Path) -> Path:
-    """Write one row for each trial; return the path."""
+    """Write one row for each trial; return the path. Raises SaveError."""
     path = folder / CSV_NAME
-    with path.open('w', newline='') as file:
-        writer = csv.DictWriter(file, [field.name for field in fields(TrialRecord)])
-        writer.writeheader()
-        writer.writerows({**asdict(r), 'success': int(r.success)} for r in curve.records)
+    write_file(path, as_csv(curve))
     return path
 
 
+def as_csv(curve: LearningCurve) -> str:
+    """Return the table of the curve, one row for each trial."""
+    text = io.StringIO(newline='')
+    writer = csv.DictWriter(text, [field.name for field in fields(TrialRecord)])
+    writer.writeheader()
+    writer.writerows({**asdict(r), 'success': int(r.success)} for r in curve.records)
+    return text.getvalue()
+
+
 def draw_png(curve: LearningCurve, folder: Path, window: int) -> Path:
-    """Plot the recent success rate and p(LM) over trials (as Figure 6 of the paper)."""
+    """Plot the recent success rate and p(LM) over trials (as Figure 6 of the paper).
+
+    Returns the path. Raises SaveError.
+    """
     path = folder / PNG_NAME
     trials = [record.trial for record in curve.records]
     practice = [record.stage == 'practice' for record in curve.records]
@@ -40,7 +51,9 @@ def draw_png(curve: LearningCurve, folder: Path, window: int) -> Path:
     axes.set(xlabel='trials', ylabel='rate', ylim=(0, 1.02), xlim=(0, max([1, *trials])))
     axes.grid(alpha=0.3)
     axes.legend(loc='lower right')
-    figure.savefig(path, dpi=120)
+    picture = io.BytesIO()
+    figure.savefig(picture, dpi=120, format='png')
+    write_file(path, picture.getvalue())
     return path
 
 

@@ -7,6 +7,7 @@ import yaml
 
 from ja_calibration.core.calibration_moves import Calibration
 from ja_calibration.core.fitted_value import FittedValue
+from ja_common.core.files import write_file
 
 LARGEST_DELAY_ERROR_S = 0.005
 """A delay with a larger standard error is not written: it could be off by 10 ms."""
@@ -39,11 +40,9 @@ def as_dict(
 
 
 def save(contents: dict[str, Any], path: Path) -> None:
-    """Write the file, whole or not at all. Raises OSError."""
+    """Write the file, whole or not at all. Raises SaveError."""
     text = '# Found by ./ja calibrate. Errors are standard errors; see docs/deploy.md.\n'
-    partial = path.with_name(f'{path.name}.partial')
-    partial.write_text(text + yaml.safe_dump(contents, sort_keys=False))
-    partial.replace(path)
+    write_file(path, text + yaml.safe_dump(contents, sort_keys=False))
 
 
 def _pair(fitted: FittedValue) -> dict[str, float]:

@@ -21,7 +21,7 @@ from ja_common.image_codec import decode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.synchroniser import StampedSet, Synchroniser
 from ja_common.time_codec import to_ns
-from ja_common.topics import IMAGE, JOINT_COMMANDS
+from ja_common.topics import IMAGE
 from ja_control.command_output import CommandOutput, CommandOutputConfig
 from ja_control.core.command_guard import CommandGuard, CommandGuardConfig
 from ja_control.core.joint_limits import JointLimitsConfig
@@ -42,12 +42,13 @@ class CalibratorConfig(Configuration):
 class Calibrator(GraphNode):
     """Commands the head through the moves of a calibration; `sequence.result` is its result.
 
-    Its callbacks raise ValueError where the head or the images allow no calibration.
+    `refusal` is the error where the head or the images allow no calibration.
     """
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('gate', **node_kwargs)
         self.sequence: CalibrationSequence | None = None
+        self.refusal: ValueError | None = None
         self.last_hold = ''
         self.image_size = (0, 0)
         self.joints = JointCodec(self.configure(JointConfig))
@@ -93,6 +94,12 @@ class Calibrator(GraphNode):
             self.sequence.record_image(grey, found.stamp_ns, found.posture.position)
 
     def _on_period(self) -> None:
+        try:
+            self._step()
+        except ValueError as error:
+            self.refusal = error  # the end of the calibration, not only of this call
+
+    def _step(self) -> None:
         now_s, measured = time.monotonic(), self._synchroniser.newest_posture
         if measured is not None:
             self._guard.record_joints(measured.position, now_s, self._age_s(measured.stamp_ns))
@@ -103,6 +110,7 @@ class Calibrator(GraphNode):
                 self.sequence = self._start(measured)
         if self.sequence is not None:
             self._set_target(self.sequence)
+        self._guard.other_commander = self._output.find_other_commander()
         command = self._guard.step(now_s)
         if command.hold is not None:
             self.last_hold = command.hold.text
@@ -119,11 +127,9 @@ class Calibrator(GraphNode):
             self.sequence.step(now_s, command.position, command.velocity)
 
     def _start(self, measured: Posture) -> CalibrationSequence:
-        others = self.count_publishers(self.resolve_topic_name(JOINT_COMMANDS.name)) - 1
-        if others > 0:
+        if other := self._output.find_other_commander():
             raise ValueError(
-                f'{others} other node(s) publish {JOINT_COMMANDS.name}: end the gate (./ja rig) '
-                'first, two nodes cannot command one head'
+                f'{other}: end the gate (./ja rig) first, two nodes cannot command one head'
             )
         reach = self._config.amplitude_rad
         ends = measured.position + np.array([[-reach], [reach]])

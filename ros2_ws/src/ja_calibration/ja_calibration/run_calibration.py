@@ -8,6 +8,7 @@ from ja_calibration.calibration_file import as_dict
 from ja_calibration.calibrator import Calibrator
 from ja_common.executor import CachedWaitSetExecutor
 from ja_common.private_context import private_executor
+from ja_common.stop_signals import StopSignals
 
 _BRAKING_S = 3.0
 
@@ -18,14 +19,14 @@ def run_calibration(
     """Calibrate the head and return the contents of the file.
 
     `report` receives a line of progress after each move. Raises ValueError where the head or the
-    images allow no calibration, and KeyboardInterrupt once the head stands still.
+    images allow no calibration, and KeyboardInterrupt after a signal, once the head stands still.
     """
-    # Ctrl-C must not end the context: the head has to brake first.
-    with private_executor(arguments) as executor:
+    # A signal must end nothing at once: the head has to brake first.
+    with StopSignals() as stop, private_executor(arguments) as executor:
         node = Calibrator(context=executor.context)
         executor.add_node(node)
         try:
-            _spin_until_done(node, executor, patience_s, report)
+            _spin_until_done(node, executor, stop, patience_s, report)
             assert node.sequence is not None
             assert node.sequence.result is not None
             pan, tilt = (bool(sign < 0) for sign in node.joints.signs)
@@ -37,12 +38,16 @@ def run_calibration(
 def _spin_until_done(
     node: Calibrator,
     executor: CachedWaitSetExecutor,
+    stop: StopSignals,
     patience_s: float,
     report: Callable[[str], None],
 ) -> None:
     done, progress_s = -1, time.monotonic()
     while node.sequence is None or node.sequence.result is None:
+        stop.raise_if_requested()
         executor.spin_once(timeout_sec=0.1)
+        if node.refusal is not None:
+            raise node.refusal
         now_done = -1 if node.sequence is None else node.sequence.moves_done
         if now_done != done:
             done, progress_s = now_done, time.monotonic()

@@ -1,28 +1,25 @@
-"""The base of every node: topics, services, parameters, health, a clean end."""
+"""The base of every node: topics, services, timers, parameters, health."""
 
-import sys
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
-from rclpy.exceptions import NotInitializedException
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from rclpy.subscription import Subscription
+from rclpy.timer import Timer
 
-from ja_common.core.config import ConfigError, Configuration
+from ja_common.core.config import Configuration
 from ja_common.core.health import Health, Level
 from ja_common.discovery_refresher import DiscoveryRefresher
-from ja_common.executor import CachedWaitSetExecutor
 from ja_common.parameters import declare_config
-from ja_common.ros_defaults import apply_ros_defaults
 from ja_common.topics import DIAGNOSTICS, Topic
 
 Config = TypeVar('Config', bound=Configuration)
@@ -31,9 +28,9 @@ Config = TypeVar('Config', bound=Configuration)
 class GraphNode(Node):
     """A node that survives bad input, and reports its health and silent inputs at 1 Hz.
 
-    Callbacks may raise ValueError with one clear sentence for input that cannot be used (or
-    OSError for a file): it is logged once with the topic's name, shown in /diagnostics, and the
-    node runs on.
+    Callbacks of topics, services and timers may raise ValueError with one clear sentence for input
+    that cannot be used (or OSError for a file): it is logged once with the topic's name, shown in
+    /diagnostics, and the node runs on.
     """
 
     def __init__(self, name: str, **node_kwargs: Any) -> None:
@@ -73,28 +70,53 @@ class GraphNode(Node):
     ) -> None:
         """Subscribe; when silent for longer than `expected_every_s` [s, wall time], warn why."""
 
-        def guarded(message: Any) -> None:
+        def receive(message: Any) -> None:
             self.health.record_message(resolved, time.monotonic())
-            try:
-                callback(message)
-            except (ValueError, OSError) as error:
-                self.report_problem(resolved, f'{resolved}: {error}')
-            except Exception as error:
-                # No bad input but a bug: the node runs on, and the trace is logged.
-                text = f'{resolved}: {type(error).__name__}: {error}\n{traceback.format_exc()}'
-                self.report_problem(resolved, text)
+            callback(message)
 
         # Default event callbacks cost a third of the throughput; `_why_silent` explains instead.
         subscription = self.create_subscription(
             topic.type,
             topic.name,
-            guarded,
+            receive,
             topic.subscriber_qos,
             event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
         )
         resolved = subscription.topic_name
         self.subscribed_topics[resolved] = topic
         self.health.watch_input(resolved, expected_every_s)
+
+    def create_subscription(
+        self,
+        msg_type: Any,
+        topic: str,
+        callback: Callable[..., None],
+        *more: Any,
+        **options: Any,
+    ) -> Subscription:
+        """Subscribe as rclpy does; an error of the callback is a problem of this node."""
+        where = self.resolve_topic_name(topic)
+
+        @wraps(callback)  # rclpy counts the arguments that the callback takes
+        def receive(*received: Any) -> None:
+            self.call_guarded(where, callback, *received)
+
+        return super().create_subscription(msg_type, topic, receive, *more, **options)
+
+    def create_timer(
+        self,
+        timer_period_sec: float,
+        callback: Callable[[], None],
+        *more: Any,
+        **options: Any,
+    ) -> Timer:
+        """Create a timer as rclpy does; an error of the callback is a problem of this node."""
+        where = f'timer {getattr(callback, "__name__", "")}'.rstrip()
+
+        def expire() -> None:
+            self.call_guarded(where, callback)
+
+        return super().create_timer(timer_period_sec, expire, *more, **options)
 
     def advertise_service(
         self, service_type: Any, name: str, callback: Callable[[Any, Any], Any]
@@ -119,27 +141,42 @@ class GraphNode(Node):
         """Return the subfolder for the files of this node's namespace: one for each head."""
         return Path(folder).expanduser() / self.get_namespace().strip('/')
 
-    def report_problem(self, where: str, message: str, level: Level = Level.ERROR) -> None:
-        """Show a problem in /diagnostics, and log it when it is news."""
-        if self.health.record_problem(where, message, time.monotonic(), level):
+    def report_problem(
+        self, where: str, message: str, level: Level = Level.ERROR, quiet: bool = False
+    ) -> None:
+        """Show a problem in /diagnostics, and log it when it is news and not `quiet`."""
+        if self.health.record_problem(where, message, time.monotonic(), level, quiet):
             log = self.get_logger()
             if level >= Level.ERROR:
                 log.error(message)
             else:
                 log.warning(message)
 
+    def call_guarded(self, where: str, callback: Callable[..., None], *args: Any) -> None:
+        """Call a callback; an error of it is a problem of this node, at `where`."""
+        try:
+            callback(*args)
+        except (ValueError, OSError) as error:
+            self.report_problem(where, f'{where}: {error}')
+        except Exception as error:
+            # No bad input but a bug: the node runs on, and the trace is logged.
+            text = f'{where}: {type(error).__name__}: {error}\n{traceback.format_exc()}'
+            self.report_problem(where, text)
+
     def _report(self) -> None:
         if halted_s := self._discovery_refresher.refresh(time.monotonic()):
             self.report_problem('halt', f'this node stood still for {halted_s:.1f} s', Level.WARN)
-        silent = self.health.silent_inputs(time.monotonic())
+        now_s = time.monotonic()
+        silent = self.health.silent_inputs(now_s)
         for name in self.subscribed_topics:
             where = f'silence of {name}'
             if name in silent:
                 text = f'no message on {name} for more than {silent[name]:g} s: '
-                self.report_problem(where, text + self._why_silent(name), Level.WARN)
+                quiet = self.health.is_starting(name, now_s)
+                self.report_problem(where, text + self._why_silent(name), Level.WARN, quiet)
             else:
                 self.health.clear_problem(where)
-        report = self.health.report(time.monotonic())
+        report = self.health.report(now_s)
         status = DiagnosticStatus(
             level=bytes([report.level]),
             name=self.get_fully_qualified_name(),
@@ -171,50 +208,3 @@ class GraphNode(Node):
                     f'{needed.reliability.name} {needed.durability.name} is needed'
                 )
         return f'{publishers[0].node_name} is its publisher, but sends nothing'
-
-
-def spin_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) -> None:
-    """Run a node as the `main` of its process, until SIGINT or SIGTERM.
-
-    Exits with code 2 and one sentence for a configuration that cannot be used.
-    """
-    apply_ros_defaults()
-    node = None
-    try:
-        _init(args)
-        node = make_node()
-        executor = CachedWaitSetExecutor()
-        executor.add_node(node)
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    except (ConfigError, OSError) as error:
-        print(f'error: {error}', file=sys.stderr)
-        sys.exit(2)
-    except (RuntimeError, NotInitializedException):
-        # Asked to stop while the node was being made: rclpy has ended its context under it.
-        if rclpy.ok():
-            raise
-    finally:
-        _end(node)
-
-
-def _end(node: Node | None) -> None:
-    try:
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    except KeyboardInterrupt:
-        pass  # a second Ctrl-C: the node has ended all the same
-    except RuntimeError:
-        # rclpy's own signal handler may end the context at the very same moment.
-        if rclpy.ok():
-            raise
-
-
-def _init(args: Sequence[str] | None) -> None:
-    try:
-        rclpy.init(args=args)
-    except RuntimeError as error:
-        # An unknown argument, or a parameter file that is missing or no YAML.
-        raise ConfigError(f'ROS arguments cannot be used: {error}') from None

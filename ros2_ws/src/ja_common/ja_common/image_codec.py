@@ -10,6 +10,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from std_msgs.msg import Header
 
 from ja_common.core.camera_model import CameraModel
+from ja_common.core.picture_size import MOST_PIXELS, picture_size
 
 
 class ImageError(ValueError):
@@ -114,8 +115,11 @@ def decode_compressed(msg: CompressedImage) -> np.ndarray:
     Raises ``ImageError`` when the data is no picture.
     """
     data = np.frombuffer(msg.data, np.uint8)
-    # IMREAD_COLOR_RGB also reduces grey, alpha and 16-bit PNG to 8-bit RGB.
-    picture = cv2.imdecode(data, cv2.IMREAD_COLOR_RGB) if data.size else None
+    size = picture_size(data.data) if data.size else None
+    if size is not None and size[0] * size[1] > MOST_PIXELS:
+        raise ImageError(f'a picture of {size[0]}x{size[1]} is larger than {MOST_PIXELS} pixels')
+    # No other format is decoded. IMREAD_COLOR_RGB also reduces grey, alpha and 16-bit PNG to RGB.
+    picture = None if size is None else cv2.imdecode(data, cv2.IMREAD_COLOR_RGB)
     if picture is None:
         raise ImageError(f"{data.size} bytes of format '{msg.format}' are no readable picture")
     return picture

@@ -1,6 +1,11 @@
-"""Message types by name: the class, and the text of its definition."""
+"""Message types by name: the class, and the text of its definition.
+
+Names come from recordings and from the graph, so from anybody. A name is looked up among the
+installed interface packages alone, before anything of that name is imported or read.
+"""
 
 import importlib
+import importlib.util
 import os
 import re
 import sys
@@ -11,13 +16,19 @@ from typing import Any
 from ja_common.core.config import ConfigError
 
 _SEPARATOR = '=' * 80
+# As ROS names them (REP 144 and the style guide of interfaces); a path could not be one.
+_TYPE = re.compile(r'(?P<package>[a-z][a-z0-9_]*)/msg/(?P<name>[A-Z][A-Za-z0-9]*)')
 # A field's type at the start of a line: `Point32[] points`, `std_msgs/Header header`.
 _FIELD = re.compile(r'^\s*(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?:\[[^\]]*\])?\s+\w+', re.MULTILINE)
 
 
+@cache
 def message_class(type_name: str) -> Any:
     """Return the class of `package/msg/Name`. Raises ConfigError when it is not installed."""
-    package, _, name = type_name.partition('/msg/')
+    prefixes = {path.parents[3] for path in _definition_files(type_name)}
+    package, _, name = type_name.split('/')
+    if not any(_python_package(package).is_relative_to(prefix) for prefix in prefixes):
+        raise ConfigError(f'the message type {type_name} is not installed for this Python')
     try:
         return getattr(importlib.import_module(f'{package}.msg'), name)
     except (ImportError, AttributeError):
@@ -45,13 +56,31 @@ def schema_of(type_name: str) -> str:
 
 @cache
 def _definition(type_name: str) -> str:
+    return _definition_files(type_name)[0].read_text(encoding='utf-8')
+
+
+def _definition_files(type_name: str) -> list[Path]:
+    """Return the files `PREFIX/share/package/msg/Name.msg`; ConfigError when there is none."""
+    if not _TYPE.fullmatch(type_name):
+        raise ConfigError(f'{type_name[:100]!r} is no name of a message type')
     # A sourced ROS names its folders; the wheels keep theirs in the environment.
-    prefixes = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
-    for prefix in filter(None, prefixes):
-        path = Path(prefix, 'share', f'{type_name}.msg')
-        if path.is_file():
-            return path.read_text(encoding='utf-8')
-    raise ConfigError(f'no share/{type_name}.msg below any of {", ".join(filter(None, prefixes))}')
+    named = [*os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep), sys.prefix]
+    prefixes = [Path(prefix) for prefix in named if os.path.isabs(prefix)]
+    paths = [prefix / 'share' / f'{type_name}.msg' for prefix in prefixes]
+    found = [path for path in paths if path.is_file()]
+    if not found:
+        places = ', '.join(map(str, prefixes))
+        raise ConfigError(f'no share/{type_name}.msg below any of {places}')
+    return found
+
+
+def _python_package(name: str) -> Path:
+    """Return where Python would import a package from, without an import."""
+    try:
+        spec = importlib.util.find_spec(name)
+    except (ImportError, ValueError):
+        spec = None
+    return Path(spec.origin) if spec and spec.origin else Path()
 
 
 def _inner_types(type_name: str) -> list[str]:

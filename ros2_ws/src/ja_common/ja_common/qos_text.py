@@ -11,6 +11,9 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 
+from ja_common.core.config import ConfigError
+from ja_common.core.safe_files import parse_yaml
+
 _PLAY_DEPTH = 100
 
 
@@ -47,9 +50,15 @@ def common_profile(reliable: bool, latched: bool, depth: int = _PLAY_DEPTH) -> Q
 def profile_of(text: str) -> QoSProfile:
     """Return the profile for playing a recorded topic, with its reliability and durability.
 
-    Numbers, as rosbag2 wrote them before version 9, mean the same as the words.
+    Numbers, as rosbag2 wrote them before version 9, mean the same as the words. Raises ConfigError
+    when the text, which comes from the recording, is something else.
     """
-    offered = yaml.safe_load(text) if text else []
+    offered = parse_yaml(text, 'offered_qos_profiles') or []
+    wanted = {'reliability', 'durability'}
+    if not isinstance(offered, list) or not all(
+        isinstance(each, dict) and wanted <= each.keys() for each in offered
+    ):
+        raise ConfigError(f'offered_qos_profiles are no profiles: {text[:100]!r}')
     reliable = all(each['reliability'] in ('reliable', 1) for each in offered)
     latched = bool(offered) and all(
         each['durability'] in ('transient_local', 1) for each in offered

@@ -44,18 +44,46 @@ class CommandOutput:
     """
 
     def __init__(self, node: GraphNode, config: CommandOutputConfig) -> None:
+        self._node = node
         self._config = config
         self._joint_commands = node.create_topic_publisher(JOINT_COMMANDS)
         topic = {'joint_trajectory': JOINT_TRAJECTORY, 'float64_multi_array': FORWARD_COMMANDS}
         self._controller = (
             node.create_topic_publisher(topic[config.output]) if config.output in topic else None
         )
+        publishers = (self._joint_commands, self._controller)
+        self._topics = [each.topic_name for each in publishers if each is not None]
 
     def publish(self, command: JointState) -> None:
         """Publish a command: names, position [rad], velocity [rad/s], in the rig's signs."""
         self._joint_commands.publish(command)
         if self._controller is not None:
             self._controller.publish(self._for_controller(command))
+
+    def find_other_commander(self) -> str:
+        """Return a sentence with the other nodes that publish on a topic of these commands, or ''.
+
+        Takes some microseconds while there are none: call it before every command.
+        """
+        for topic in self._topics:
+            # Endpoints are counted, not names: a second gate has the name of this one. Our own is
+            # in the count from the moment it is made.
+            if self._node.count_publishers(topic) > self._topics.count(topic):
+                return f'{topic} is published by {self._other_publishers(topic)} as well'
+        return ''
+
+    def _other_publishers(self, topic: str) -> str:
+        names = sorted(
+            f'{publisher.node_namespace.rstrip("/")}/{publisher.node_name}'
+            for publisher in self._node.get_publishers_info_by_topic(topic)
+        )
+        own = self._node.get_fully_qualified_name()
+        if own in names:
+            names.remove(own)
+        return (
+            ', '.join(f'another {name}' if name == own else name for name in names)
+            or 'an unknown node'
+        )
 
     def _for_controller(self, command: JointState) -> Any:
         if self._config.output == 'float64_multi_array':

@@ -14,9 +14,11 @@ from std_srvs.srv import SetBool, Trigger
 from ja_common.core.config import ConfigError, Configuration, parameter
 from ja_common.core.posture import REORDERED_WITHIN_S, Posture
 from ja_common.core.stamps import NS_PER_S
-from ja_common.graph_node import GraphNode, spin_node
+from ja_common.graph_node import GraphNode
 from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.node_main import spin_node
 from ja_common.point_cloud_codec import decode_columns
+from ja_common.reported_save import ReportedSave
 from ja_common.synchroniser import StampedSet, Synchroniser
 from ja_common.topics import (
     EVIDENCE,
@@ -36,8 +38,9 @@ from ja_control.core.attention_cycle import (
     CycleInput,
     Decision,
 )
-from ja_control.core.command_guard import Cause, Command, CommandGuard, CommandGuardConfig, Hold
+from ja_control.core.command_guard import Command, CommandGuard, CommandGuardConfig
 from ja_control.core.gating import Gating, GatingConfig
+from ja_control.core.hold import Cause, Hold
 from ja_control.core.joint_limits import JointLimitsConfig
 from ja_control.core.trial_count import load_trials, save_trials
 from ja_control.core.urdf_limits import narrow_limits, read_joint
@@ -104,6 +107,10 @@ class GateNode(GraphNode):
         kept = Path(self._config.trials_file)
         self._trials_file = self.namespaced_folder(kept.parent) / kept.name
         self._cycle.trials = self._load_trials()
+        self._trials_save: ReportedSave | None = None
+        if self._config.trials_file:
+            self._trials_save = ReportedSave(self, 'trials_file', self._save_trials)
+            self._trials_save.request()  # now, so that a bad place shows before the first trial
 
         self._header = Header()
         self._stamp_ns = 0
@@ -151,6 +158,15 @@ class GateNode(GraphNode):
         except ValueError as error:
             raise ConfigError(f'trials_file: {error}') from None
 
+    def _save_trials(self) -> None:
+        save_trials(self._trials_file, self._cycle.trials)
+
+    def destroy_node(self) -> None:
+        """Save the count of trials, then end."""
+        if self._trials_save is not None:
+            self._trials_save.close()
+        super().destroy_node()
+
     def _on_robot_description(self, message: String) -> None:
         self._urdf = message.data
         self._guard.blocked = f'{ROBOT_DESCRIPTION.name} cannot be used'
@@ -181,11 +197,14 @@ class GateNode(GraphNode):
         self._header, self._stamp_ns = found.header, posture.stamp_ns
         now_s = self._now_s()
         self._guard.record_image(now_s, self._age_s(posture.stamp_ns))
-        self._decision = self._decide(found)
-        if lockstep:
-            seconds = min(max(step_s, 0.0), _LONGEST_STEP_S)
-            # Not the newest posture: which one that is depends on the scheduling.
-            self._step(now_s, posture, max(1, round(seconds * self._config.control_rate_hz)))
+        try:
+            self._decision = self._decide(found)
+        finally:
+            # Also after an error: without an answer the sim would stand still for ever.
+            if lockstep:
+                seconds = min(max(step_s, 0.0), _LONGEST_STEP_S)
+                # Not the newest posture: which one that is depends on the scheduling.
+                self._step(now_s, posture, max(1, round(seconds * self._config.control_rate_hz)))
 
     def _decide(self, found: StampedSet) -> Decision | None:
         if not self._guard.engaged:
@@ -204,8 +223,8 @@ class GateNode(GraphNode):
             )
         )
         self._guard.set_target(decision.target)
-        if decision.trials != trials and self._config.trials_file:
-            save_trials(self._trials_file, decision.trials)
+        if decision.trials != trials and self._trials_save is not None:
+            self._trials_save.request()
         return decision
 
     def _now_s(self) -> float:
@@ -226,6 +245,7 @@ class GateNode(GraphNode):
     def _step(self, now_s: float, measured: Posture | None, periods: int) -> None:
         if measured is not None:
             self._guard.record_joints(measured.position, now_s, self._age_s(measured.stamp_ns))
+        self._guard.other_commander = self._output.find_other_commander()
         command = self._guard.step(now_s, periods)
         changed = self._update_hold(command.hold)
         if self._config.lockstep and command.position is None and measured is not None:

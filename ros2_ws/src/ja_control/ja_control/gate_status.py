@@ -4,7 +4,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from ja_common.core.health import Level
 from ja_control.core.attention_cycle import AttentionCycle, Decision
-from ja_control.core.command_guard import Hold
+from ja_control.core.hold import Hold
 
 
 def encode_gate_status(

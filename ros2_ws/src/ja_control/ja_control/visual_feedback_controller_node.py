@@ -6,8 +6,9 @@ from sensor_msgs.msg import PointCloud2
 
 from ja_common.core.detection import Detection, caregiver_face, most_salient
 from ja_common.detection_codec import decode_detections
-from ja_common.graph_node import GraphNode, spin_node
+from ja_common.graph_node import GraphNode
 from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.node_main import spin_node
 from ja_common.topics import DETECTIONS, FACE_DELTA, VF_DELTA
 from ja_control.core.visual_feedback import VisualFeedbackConfig, visual_feedback
 

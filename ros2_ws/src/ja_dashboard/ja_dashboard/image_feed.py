@@ -1,15 +1,14 @@
 """Images with their detections, polled from the graph while the page has a viewer."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from rclpy.node import Node
-from sensor_msgs.msg import CameraInfo, JointState, PointCloud2
+from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 
 from ja_common.core.annotate import annotate_image
 from ja_common.core.camera_model import CameraModel
@@ -18,6 +17,7 @@ from ja_common.core.fixation import WIDTH_SIXTH
 from ja_common.core.geometry import directions_of_rays
 from ja_common.core.posture import PostureHistory
 from ja_common.detection_codec import decode_detections
+from ja_common.graph_node import GraphNode
 from ja_common.image_codec import decode_camera_info, decode_image
 from ja_common.joint_codec import JointCodec
 from ja_common.point_cloud_codec import decode_columns
@@ -52,6 +52,8 @@ _STEPS = (DETECTIONS, VF_DELTA, LM_DELTA, FIXATION, JOINT_COMMANDS)
 """The topics that follow from an image, in their order."""
 _ASSUMED_VIEW_RAD = math.radians(36)
 _JPEG_QUALITY = 80
+_MOST_PX = 8192
+_MOST_POINTS = 2000
 LIMITS = ('pan_min_rad', 'tilt_min_rad', 'pan_max_rad', 'tilt_max_rad')
 """The gate's parameters, in the order of (low, high)."""
 
@@ -77,9 +79,12 @@ class Picture:
 
 
 class ImageFeed:
-    """All topics that come once an image; exists only while the page has a viewer."""
+    """All topics that come once an image; exists only while the page has a viewer.
 
-    def __init__(self, node: Node, model: ViewModel, joints: JointCodec) -> None:
+    A message that cannot be shown is a problem of the node; all others are shown.
+    """
+
+    def __init__(self, node: GraphNode, model: ViewModel, joints: JointCodec) -> None:
         self._node = node
         self._model = model
         self._joints = joints
@@ -90,6 +95,9 @@ class ImageFeed:
         self._pending: tuple[int, Any] | None = None
         self._sent_ns: dict[int, int] = {}
         self._calibration: CameraInfo | None = None
+        self._command: NDArray[np.float64] | None = None
+        self._belief = np.zeros((0, 3))
+        self._truth: TruthView | None = None
         self.limits = np.radians([[-60.0, -35.0], [60.0, 35.0]])
         self.picture: Picture | None = None
         self.scene: SceneView | None = None
@@ -107,6 +115,7 @@ class ImageFeed:
             self.subscriptions[SIM_TRUTH] = PolledSubscription(self._node, SIM_TRUTH, 1)
         elif not shown and SIM_TRUTH in self.subscriptions:
             self.subscriptions.pop(SIM_TRUTH).close()
+            self._truth = None
 
     def poll_messages(self, now_s: float, fixations: list[tuple[JointState, int]]) -> None:
         """Take the new messages; `fixations` come from the subscription of the node.
@@ -117,22 +126,21 @@ class ImageFeed:
             topic: subscription.take_messages()
             for topic, subscription in self.subscriptions.items()
         } | {FIXATION: fixations}
-        for message, _ in taken[CAMERA_INFO]:
-            self._calibration = message
-        for message, _ in taken[JOINT_STATES]:
-            if (posture := self._joints.decode_posture(message)) is not None:
-                self._postures.record_posture(to_ns(message.header.stamp), posture)
         self._measure_latencies(taken)
-        found = {to_ns(message.header.stamp): message for message, _ in taken[DETECTIONS]}
-        faces = {to_ns(message.header.stamp): message for message, _ in taken[FACE_IMAGE]}
-        if self._pending is not None and self._pending[0] in found:
-            self._show(*self._pending, found, faces, taken)
-        for message, _ in taken[IMAGE]:
-            stamp_ns = to_ns(message.header.stamp)
-            self._model.record_image(stamp_ns, now_s)
-            self._pending = (stamp_ns, message)
-            if stamp_ns in found:
-                self._show(stamp_ns, message, found, faces, taken)
+        for topic, callback in (
+            (CAMERA_INFO, self._on_camera_info),
+            (JOINT_STATES, self._on_joint_state),
+            (JOINT_COMMANDS, self._on_command),
+            (BELIEF, self._on_belief),
+            (SIM_TRUTH, self._on_truth),
+        ):
+            for message, _ in taken.get(topic, []):
+                self._node.call_guarded(topic.name, callback, message)
+        self._show_images(now_s, taken)
+        if self.scene is not None:
+            self.scene = replace(
+                self.scene, command=self._command, belief=self._belief, truth=self._truth
+            )
 
     def _measure_latencies(self, taken: Mapping[Topic, list[tuple[Any, int]]]) -> None:
         """Measure how long after an image each node published its result."""
@@ -146,21 +154,54 @@ class ImageFeed:
                 if image_ns is not None:
                     self.latencies_ms[topic.name] = (sent_ns - image_ns) / 1e6
 
-    def _show(
-        self,
-        stamp_ns: int,
-        message: Any,
-        found: Mapping[int, PointCloud2],
-        faces: Mapping[int, Any],
-        taken: Mapping[Topic, list[tuple[Any, int]]],
-    ) -> None:
-        self._pending = None
-        image = decode_image(message)
-        detections = decode_detections(found[stamp_ns])
-        face = decode_image(faces[stamp_ns])[..., 0] if stamp_ns in faces else None
+    def _on_camera_info(self, message: CameraInfo) -> None:
+        decode_camera_info(message, 1, 1)  # raises ValueError: the last good calibration stays
+        self._calibration = message
+
+    def _on_joint_state(self, message: JointState) -> None:
+        if (posture := self._joints.decode_posture(message)) is not None:
+            self._postures.record_posture(to_ns(message.header.stamp), posture)
+
+    def _on_command(self, message: JointState) -> None:
+        if (posture := self._joints.decode_posture(message)) is not None:
+            self._command = posture
+
+    def _on_belief(self, message: PointCloud2) -> None:
+        columns = _shown_columns(message, ('pan', 'tilt', 'weight'))
+        self._belief = np.column_stack(list(columns.values())).astype(float)
+
+    def _on_truth(self, message: PointCloud2) -> None:
+        c = _shown_columns(message, ('x', 'y', 'z', 'pan', 'tilt', 'attended'))
+        attended = np.flatnonzero(c['attended'])
+        self._truth = TruthView(
+            np.column_stack([c['x'], c['y'], c['z']]).astype(float),
+            np.column_stack([c['pan'], c['tilt']]).astype(float),
+            int(attended[0]) if len(attended) else -1,
+        )
+
+    def _show_images(self, now_s: float, taken: Mapping[Topic, list[tuple[Any, int]]]) -> None:
+        found = {to_ns(message.header.stamp): message for message, _ in taken[DETECTIONS]}
+        faces = {to_ns(message.header.stamp): message for message, _ in taken[FACE_IMAGE]}
+        pending = [] if self._pending is None else [self._pending]
+        for message, _ in taken[IMAGE]:
+            stamp_ns = to_ns(message.header.stamp)
+            self._model.record_image(stamp_ns, now_s)
+            pending.append((stamp_ns, message))
+        for stamp_ns, message in pending:
+            self._pending = (stamp_ns, message)
+            if stamp_ns in found:
+                self._pending = None
+                detections, face = found[stamp_ns], faces.get(stamp_ns)
+                self._node.call_guarded(
+                    IMAGE.name, self._show, stamp_ns, message, detections, face
+                )
+
+    def _show(self, stamp_ns: int, message: Any, found: PointCloud2, face: Any) -> None:
+        image = _shown_image(message)
+        detections: list[Detection] = self._decoded(DETECTIONS, _shown_detections, found) or []
+        face_image = None if face is None else self._decoded(FACE_IMAGE, _shown_image, face)
         camera = self._camera(image)
         latency_s = self.latencies_ms.get(DETECTIONS.name, 0.0) / 1e3
-        self.picture = Picture(stamp_ns, image, detections, face, camera, latency_s)
         sample = self._postures.at(stamp_ns) or self._postures.newest
         posture = None if sample is None else sample.position
         rays = np.array([detection.ray for detection in detections]).reshape(-1, 2)
@@ -171,36 +212,49 @@ class ImageFeed:
             low=self.limits[0],
             high=self.limits[1],
             posture=posture,
-            command=self._newest_command(taken[JOINT_COMMANDS]),
             detections=detections if posture is not None else [],
             directions=np.zeros((0, 2)) if posture is None else directions_of_rays(posture, rays),
-            belief=self._belief(taken[BELIEF]),
-            truth=self._truth(taken.get(SIM_TRUTH, [])),
         )  # fmt: skip
+        grey = None if face_image is None else face_image[..., 0]
+        self.picture = Picture(stamp_ns, image, detections, grey, camera, latency_s)
 
-    def _newest_command(self, taken: list[tuple[JointState, int]]) -> NDArray[np.float64] | None:
-        if taken:
-            return self._joints.decode_posture(taken[-1][0])
-        return self.scene.command if self.scene else None
-
-    def _belief(self, taken: list[tuple[PointCloud2, int]]) -> NDArray[np.float64]:
-        if taken:
-            columns = decode_columns(taken[-1][0], ('pan', 'tilt', 'weight'))
-            return np.column_stack(list(columns.values())).astype(float)
-        return self.scene.belief if self.scene else np.zeros((0, 3))
-
-    def _truth(self, taken: list[tuple[PointCloud2, int]]) -> TruthView | None:
-        if taken:
-            c = decode_columns(taken[-1][0], ('x', 'y', 'z', 'pan', 'tilt', 'attended'))
-            attended = np.flatnonzero(c['attended'])
-            return TruthView(
-                np.column_stack([c['x'], c['y'], c['z']]).astype(float),
-                np.column_stack([c['pan'], c['tilt']]).astype(float),
-                int(attended[0]) if len(attended) else -1,
-            )
-        return self.scene.truth if self.scene and SIM_TRUTH in self.subscriptions else None
+    def _decoded(self, topic: Topic, decode: Callable[[Any], Any], message: Any) -> Any:
+        """Return what a message holds; None where it cannot be decoded."""
+        decoded: list[Any] = []
+        self._node.call_guarded(topic.name, lambda: decoded.append(decode(message)))
+        return decoded[0] if decoded else None
 
     def _camera(self, image: NDArray[np.uint8]) -> CameraModel:
         height, width = image.shape[:2]
         camera = decode_camera_info(self._calibration, width, height)
         return camera or CameraModel.from_field_of_view(width, height, _ASSUMED_VIEW_RAD)
+
+
+def _shown_image(message: Image) -> NDArray[np.uint8]:
+    """Decode an image that a JPEG can hold and a browser can show."""
+    if max(message.width, message.height) > _MOST_PX:
+        raise ValueError(
+            f'an image of {message.width}x{message.height} is too large for the page, which shows '
+            f'up to {_MOST_PX} pixels a side'
+        )
+    return decode_image(message)
+
+
+def _shown_detections(message: PointCloud2) -> list[Detection]:
+    _check_count(message)
+    return decode_detections(message)
+
+
+def _shown_columns(message: PointCloud2, names: Sequence[str]) -> dict[str, NDArray[np.float32]]:
+    """Decode columns of a cloud that can be drawn: not too many points, all of them finite."""
+    _check_count(message)
+    columns = decode_columns(message, names)
+    if not all(np.isfinite(column).all() for column in columns.values()):
+        raise ValueError('the point cloud holds numbers that are not finite')
+    return columns
+
+
+def _check_count(message: PointCloud2) -> None:
+    count = message.width * message.height
+    if count > _MOST_POINTS:
+        raise ValueError(f'the page draws up to {_MOST_POINTS} points, not {count}')

@@ -52,6 +52,7 @@ class PageModel(Protocol):
     def call_switch(self, service: str, on: bool) -> None: ...
     def call_trigger(self, service: str) -> None: ...
     def set_remote_parameter(self, name: str, value: Any) -> None: ...
+    def report_failure(self, where: str, error: Exception) -> None: ...
 
 
 class Page:
@@ -76,7 +77,7 @@ class _OpenPage:
         # The last known state of the switches and settings; `_mirroring` while the page shows it.
         self._mirrored: dict[str, Any] = {}
         self._mirroring = False
-        ui.add_css(_STYLE)
+        ui.add_head_html(f'<style>{_STYLE}</style>')
         with ui.row().classes('w-full items-center gap-2'):
             ui.label('Joint attention').classes('text-lg font-medium')
             self._badge = ui.badge('').mark('state').classes('text-sm px-2 py-1')
@@ -181,18 +182,39 @@ class _OpenPage:
             self._picture.set_source(f'{PICTURE_URL}?{picture.stamp_ns}')
 
     def _show_others(self) -> None:
+        """Show the frame; a part that fails is reported, and the others are shown."""
         frame = self._model.frame
+        for show in (
+            self._show_state,
+            self._show_scene,
+            self._show_nodes,
+            self._show_controls,
+            self._show_curve,
+            self._show_log,
+        ):
+            try:
+                show(frame)
+            except Exception as error:
+                self._model.report_failure(f'page, {show.__name__}', error)
+
+    def _show_state(self, frame: Any) -> None:
         self._badge.set_text(frame.state.run.value)
         self._badge.props(f'color={_COLOURS[frame.state.run]}')
         self._why.set_text(frame.state.text)
         for shown in (self._picture, self._scene, self._postures):
             old = not (frame.state.is_live or frame.state.run is RunState.PAUSED)
             shown.classes(add='ja-old' if old else '', remove='' if old else 'ja-old')
+        self._facts.set_content(facts_html(frame.facts))
+
+    def _show_scene(self, frame: Any) -> None:
         if frame.scene is not None:
             self._scene.set_content(drawings.from_above(frame.scene))
             self._postures.set_content(drawings.postures(frame.scene))
-        self._facts.set_content(facts_html(frame.facts))
+
+    def _show_nodes(self, frame: Any) -> None:
         self._nodes.set_content(nodes_html(frame.node_health, frame.latencies_ms))
+
+    def _show_controls(self, frame: Any) -> None:
         for name, element in {**self._buttons, **self._switches}.items():
             element.set_visibility(name in frame.services)
         self._truth.set_visibility('sim/step' in frame.services)
@@ -201,9 +223,13 @@ class _OpenPage:
         for name, select in self._settings.items():
             select.set_visibility(name in frame.settings)
         self._mirror({**self._switches, **self._settings}, {**frame.switches, **frame.settings})
+
+    def _show_curve(self, frame: Any) -> None:
         if frame.curve is not self._curve:
             self._curve = frame.curve
             _fill_chart(self._chart, frame.curve)
+
+    def _show_log(self, frame: Any) -> None:
         for number, line in frame.log:
             if number > self._shown_log:
                 self._shown_log = number
@@ -212,14 +238,16 @@ class _OpenPage:
     def _mirror(self, elements: dict[str, Any], values: dict[str, Any]) -> None:
         """Show values that have changed; a value that the viewer just chose stays."""
         self._mirroring = True
-        for name, value in values.items():
-            if name not in self._mirrored or self._mirrored[name] != value:
-                self._mirrored[name] = value
-                element = elements[name]
-                if isinstance(element, ui.select) and value not in element.options:
-                    element.set_options({**dict(element.options), value: str(value)})
-                element.set_value(value)
-        self._mirroring = False
+        try:
+            for name, value in values.items():
+                if name not in self._mirrored or self._mirrored[name] != value:
+                    self._mirrored[name] = value
+                    element = elements[name]
+                    if isinstance(element, ui.select) and value not in element.options:
+                        element.set_options({**dict(element.options), value: str(value)})
+                    element.set_value(value)
+        finally:
+            self._mirroring = False
 
 
 def facts_html(facts: dict[str, str]) -> str:

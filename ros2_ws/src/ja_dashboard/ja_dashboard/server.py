@@ -1,14 +1,19 @@
 """The web server of the live page, in its own thread; it ends with the process."""
 
 import asyncio
+import ipaddress
+import logging
+import secrets
 import socket
 import threading
 
 import uvicorn
 from fastapi import FastAPI, Response
-from nicegui import ui
+from nicegui import core, ui
 
 from ja_common.core.config import ConfigError
+from ja_dashboard.access_guard import TOKEN, AccessGuard, allow_inline_scripts_of_page
+from ja_dashboard.core.access import AccessRules, listed_hosts, own_hosts
 from ja_dashboard.page import PICTURE_URL, Page, PageModel
 
 _GRACE_S = 1
@@ -16,16 +21,38 @@ _PORTS = 50
 
 
 class Server(threading.Thread):
-    """Web server of the live page, as a context manager; open `address` in a browser."""
+    """Web server of the live page, as a context manager; open `address` in a browser.
 
-    def __init__(self, model: PageModel, host: str, port: int) -> None:
-        """Take the port, or the next one that is free. Raises ConfigError when none is."""
+    Where other machines can reach it, `address` holds the token without which it shows nothing.
+    """
+
+    def __init__(self, model: PageModel, host: str, port: int, allowed_hosts: str = '') -> None:
+        """Take the port, or the next one that is free. Raises ConfigError when none is.
+
+        `allowed_hosts` are further names of this machine, separated by commas.
+        """
         super().__init__(name='web server', daemon=True)
-        self._socket = _listen(host, port)
-        shown = '127.0.0.1' if host == '0.0.0.0' else host
-        self.address = f'http://{shown}:{self._socket.getsockname()[1]}'
+        self._socket = _listen(host or '0.0.0.0', port)
+        bound, port = self._socket.getsockname()[:2]
+        ip = ipaddress.ip_address(bound.partition('%')[0])
+        token = None if ip.is_loopback else secrets.token_urlsafe()
+        hosts = own_hosts(host, socket.gethostname(), serves_others=token is not None)
+        rules = AccessRules([*hosts, *listed_hosts(allowed_hosts)], port, token)
+        self.address = f'http://{_shown(host, ip)}:{port}'
+        if token is not None:
+            self.address += f'/?{TOKEN}={token}'
+        logging.getLogger('uvicorn.error').addFilter(_is_no_refused_socket)
         self._server = uvicorn.Server(
-            uvicorn.Config(web_app(model), log_level='warning', timeout_graceful_shutdown=_GRACE_S)
+            uvicorn.Config(
+                AccessGuard(web_app(model), rules, port),
+                # The stricter parser: it refuses repeated Host headers, and keeps 'http://x/'
+                # apart from '/'.
+                http='h11',
+                # No proxy is expected: a header may not change the scheme or the client.
+                proxy_headers=False,
+                log_level='warning',
+                timeout_graceful_shutdown=_GRACE_S,
+            )
         )
 
     def __enter__(self) -> 'Server':
@@ -41,8 +68,12 @@ class Server(threading.Thread):
 
 
 def web_app(model: PageModel) -> FastAPI:
-    """Return an app that serves the page and its picture."""
+    """Return an app that serves the page and its picture; `AccessGuard` belongs before it."""
     app = picture_app(model)
+    allow_inline_scripts_of_page()
+    # A WebSocket always tells where it comes from; polling by GET does not.
+    core.app.config.socket_io_js_transports = ['websocket']
+    core.sio.eio.transports = ['websocket']
     ui.run_with(app, root=Page(model).build, title='Joint attention', dark=True)
     return app
 
@@ -52,7 +83,7 @@ def picture_app(model: PageModel) -> FastAPI:
 
     Each request also notes a viewer.
     """
-    app = FastAPI()
+    app = FastAPI(openapi_url=None)
 
     @app.get(PICTURE_URL)
     def picture() -> Response:
@@ -60,8 +91,12 @@ def picture_app(model: PageModel) -> FastAPI:
         shown = model.frame.picture
         if shown is None:
             return Response(status_code=404)
-        headers = {'Cache-Control': 'no-store'}
-        return Response(shown.jpeg(), media_type='image/jpeg', headers=headers)
+        try:
+            jpeg = shown.jpeg()
+        except Exception as error:
+            model.report_failure('picture', error)
+            return Response(status_code=404)
+        return Response(jpeg, media_type='image/jpeg', headers={'Cache-Control': 'no-store'})
 
     return app
 
@@ -70,9 +105,22 @@ def _listen(host: str, first_port: int) -> socket.socket:
     last_port = min(first_port + _PORTS - 1, 65535)
     for port in range(first_port, last_port + 1):
         try:
-            return socket.create_server((host, port))
+            family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+            return socket.create_server((host, port), family=family)
         except OSError as error:
             reason = error.strerror
     raise ConfigError(
         f'the page cannot be served on {host}, ports {first_port} to {last_port}: {reason}'
     )
+
+
+def _is_no_refused_socket(record: logging.LogRecord) -> bool:
+    """Leave out uvicorn's complaint about a refused socket: strangers could fill the log."""
+    return 'without completing handshake' not in record.getMessage()
+
+
+def _shown(host: str, ip: ipaddress.IPv4Address | ipaddress.IPv6Address) -> str:
+    """Return the host for an address that a browser on this machine can open."""
+    if ip.is_unspecified:
+        return '127.0.0.1' if ip.version == 4 else '[::1]'
+    return f'[{host}]' if ':' in host else host

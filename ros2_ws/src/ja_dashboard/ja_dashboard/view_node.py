@@ -23,8 +23,9 @@ from std_srvs.srv import SetBool, Trigger
 from ja_common.core.config import Configuration, parameter
 from ja_common.core.health import Level
 from ja_common.core.live_page import LIVE_PAGE
-from ja_common.graph_node import GraphNode, spin_node
+from ja_common.graph_node import GraphNode
 from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.node_main import spin_node
 from ja_common.parameters import choices_of
 from ja_common.polled_subscription import PolledSubscription
 from ja_common.status_values import status_values
@@ -46,6 +47,7 @@ _SETTINGS = {
     'objects': 'sim',
 }
 """Parameters that the page sets, and the node of each."""
+_SETTING_TYPES = {'learner': (str,), 'real_time_factor': (float, int), 'objects': (int,)}
 
 
 @dataclass(frozen=True)
@@ -53,10 +55,14 @@ class ViewConfig(Configuration):
     """Where the page is served."""
 
     host: str = parameter(
-        '127.0.0.1', 'address of the page; 0.0.0.0 serves it to every machine on the network'
+        '127.0.0.1',
+        'address of the page; 0.0.0.0 serves it to every machine that shows its token',
     )
     port: int = parameter(
         8080, 'port of the page; the next one that is free if it is taken', low=1, high=65535
+    )
+    allowed_hosts: str = parameter(
+        '', 'further names under which browsers may open the page: NAME or NAME:PORT, with commas'
     )
 
 
@@ -147,9 +153,14 @@ class ViewNode(GraphNode):
         """Set one of the parameters that the page knows; the answer goes to the log."""
         self._requests.put(partial(self._set, name, value))
 
+    def report_failure(self, where: str, error: Exception) -> None:
+        """Report what a part of the page could not show."""
+        text = f'{where}: {type(error).__name__}: {error}'
+        self._requests.put(partial(self.report_problem, where, text))
+
     def _poll(self) -> None:
         while not self._requests.empty():
-            self._requests.get()()
+            self.call_guarded('request of the page', self._requests.get())
         now_s = time.monotonic()
         self._open_or_close_feed(now_s)
         fixations = self._fixations.take_messages()
@@ -158,11 +169,14 @@ class ViewNode(GraphNode):
         for message, _ in self._statuses.take_messages():
             self._model.record_gate_status(status_values(message))
         if self._feed is not None:
-            if self._limits is not None:
-                self._feed.limits = self._limits
-            self._feed.show_truth(self._truth_shown)
-            self._feed.poll_messages(now_s, fixations)
+            self.call_guarded('images', self._poll_feed, self._feed, now_s, fixations)
         self.frame = self._make_frame()
+
+    def _poll_feed(self, feed: ImageFeed, now_s: float, fixations: list[Any]) -> None:
+        if self._limits is not None:
+            feed.limits = self._limits
+        feed.show_truth(self._truth_shown)
+        feed.poll_messages(now_s, fixations)
 
     def _open_or_close_feed(self, now_s: float) -> None:
         has_viewer = now_s - self._viewer_s < _VIEWER_STAYS_S
@@ -197,10 +211,15 @@ class ViewNode(GraphNode):
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            level = Level(int.from_bytes(status.level, 'little'))
-            values = status_values(status)
-            health = NodeHealth(status.name, level, status.message, time.monotonic(), values)
-            self._model.record_health(health)
+            self.call_guarded(DIAGNOSTICS.name, self._record_status, status)
+
+    def _record_status(self, status: DiagnosticStatus) -> None:
+        number = int.from_bytes(status.level, 'little')
+        if number not in list(Level):
+            raise ValueError(f'level {number} of {status.name!r} is no level of a diagnosis')
+        values = status_values(status)
+        health = NodeHealth(status.name, Level(number), status.message, time.monotonic(), values)
+        self._model.record_health(health)
 
     def _on_log(self, message: Log) -> None:
         if message.level >= LoggingSeverity.INFO:
@@ -216,7 +235,7 @@ class ViewNode(GraphNode):
             verdict = '' if answer.success else 'refused: '
             self._model.append_log(f'{name}: {verdict}{answer.message}')
 
-        client.call_async(request).add_done_callback(log_answer)
+        self._when_done(client.call_async(request), name, log_answer)
 
     def _set(self, name: str, value: Any) -> None:
         client = self._remote[_SETTINGS[name]]
@@ -225,37 +244,49 @@ class ViewNode(GraphNode):
             return
 
         def log_result(future: Future) -> None:
-            result = future.result().results[0]
+            [result] = future.result().results
             text = str(value) if result.successful else f'refused: {result.reason}'
             self._model.append_log(f'{name}: {text}')
             self._ask_parameters()
 
-        client.set_parameters([Parameter(name, value=value)]).add_done_callback(log_result)
+        self._when_done(client.set_parameters([Parameter(name, value=value)]), name, log_result)
 
     def _ask_parameters(self) -> None:
         if self._feed is None:
             return
         gate = self._remote['gate']
         if gate.services_are_ready():
-            gate.get_parameters(list(LIMITS)).add_done_callback(self._store_limits)
+            limits = gate.get_parameters(list(LIMITS))
+            self._when_done(limits, 'limits of the joints', self._store_limits)
         for name, owner in _SETTINGS.items():
             client = self._remote[owner]
             if client.services_are_ready():
                 store = partial(self._store_setting, name)
-                client.get_parameters([name]).add_done_callback(store)
+                self._when_done(client.get_parameters([name]), name, store)
                 if name not in self._choices:
                     store_choices = partial(self._store_choices, name)
-                    client.describe_parameters([name]).add_done_callback(store_choices)
+                    self._when_done(client.describe_parameters([name]), name, store_choices)
+
+    def _when_done(self, future: Future, where: str, callback: Callable[[Future], None]) -> None:
+        """Have a callback read an answer, which may come from a foreign node of the same name."""
+        future.add_done_callback(partial(self.call_guarded, where, callback))
 
     def _store_limits(self, future: Future) -> None:
         values = [parameter_value_to_python(value) for value in future.result().values]
-        if len(values) == len(LIMITS) and None not in values:
-            self._limits = np.array(values).reshape(2, 2)
+        if not values or None in values:
+            return  # a gate of another make has no such parameters
+        limits = np.array(values, float)
+        if limits.shape != (len(LIMITS),) or not (limits[:2] < limits[2:]).all():
+            raise ValueError(f'{LIMITS} of the gate are no limits: {values}')
+        self._limits = limits.reshape(2, 2)
 
     def _store_setting(self, name: str, future: Future) -> None:
         values = [parameter_value_to_python(value) for value in future.result().values]
-        if values and values[0] is not None:
-            self._settings[name] = values[0]
+        if not values or values[0] is None:
+            return
+        if type(values[0]) not in _SETTING_TYPES[name] or values[0] != values[0]:
+            raise ValueError(f'{_SETTINGS[name]} has an unusable value of {name}: {values[0]!r}')
+        self._settings[name] = values[0]
 
     def _store_choices(self, name: str, future: Future) -> None:
         for descriptor in future.result().descriptors:
@@ -273,7 +304,10 @@ def main(args: list[str] | None = None) -> None:
 
         def make_served_node() -> ViewNode:
             node = ViewNode()
-            server = servers.enter_context(Server(node, node.config.host, node.config.port))
+            config = node.config
+            server = servers.enter_context(
+                Server(node, config.host, config.port, config.allowed_hosts)
+            )
             print(f'{LIVE_PAGE}{server.address}', flush=True)
             return node
 

@@ -4,7 +4,6 @@ import errno
 import glob
 import json
 import os
-import shutil
 import socket
 import subprocess
 import sys
@@ -15,11 +14,17 @@ from pathlib import Path
 
 import psutil
 
+from ja_common.python_command import code_command, module_command
 from ja_diagnostics import image_stream
+from ja_runner.image_transport import (
+    ENOUGH_SHARED_MB,
+    SHARED_MEMORY,
+    free_shared_memory_mb,
+    socket_buffer_advice,
+)
 from ja_runner.parts import is_installed
 
 _PYTHONS = ((3, 10), (3, 13))
-_SHM_MB = 64
 _RENDER = """
 from ja_sim.core.scene import load_scene
 from ja_sim.core.world import JointAttentionWorld
@@ -78,18 +83,23 @@ def check_rclpy() -> Finding:
     return Finding('rclpy', ok, f'{Path(rclpy.__file__).parent}, {middleware}', fix)
 
 
-def check_shared_memory(folder: Path = Path('/dev/shm')) -> Finding:
-    """Check that shared memory can be written and has room for images."""
+def check_shared_memory(folder: Path = SHARED_MEMORY) -> Finding:
+    """Check that shared memory can be written and has room for images, or UDP for them."""
+    free_mb, advice = free_shared_memory_mb(folder), socket_buffer_advice()
+    text = f'{free_mb} MB free in {folder}'
     if not os.access(folder, os.W_OK):
-        fix = f'mount a tmpfs at {folder}; until then images go over UDP, slowly'
-        return Finding('shared memory', False, f'{folder} cannot be written', fix)
-    free_mb = shutil.disk_usage(folder).free // 10**6
-    ok = free_mb >= _SHM_MB
-    fix = '' if ok else 'remove stale segments, or give a container more (--shm-size=512m)'
-    return Finding('shared memory', ok, f'{free_mb} MB free in {folder}', fix)
+        text, fix = f'{folder} cannot be written', f'mount a tmpfs at {folder}'
+    else:
+        fix = 'remove stale segments, or give a container more (--shm-size=512m)'
+    if free_mb >= ENOUGH_SHARED_MB:
+        return Finding('shared memory', True, text)
+    until_then = f'they are lost until `{advice}`' if advice else 'slowly'
+    return Finding(
+        'shared memory', False, text, f'{fix}; until then images go over UDP, {until_then}'
+    )
 
 
-def check_stale_segments(folder: Path = Path('/dev/shm')) -> Finding:
+def check_stale_segments(folder: Path = SHARED_MEMORY) -> Finding:
     """Look for segments of Fast DDS that no process has mapped or open; harmless but large."""
     files = {Path(path) for path in glob.glob(f'{folder}/fastrtps_*')}
     used = _files_in_use()
@@ -101,7 +111,7 @@ def check_stale_segments(folder: Path = Path('/dev/shm')) -> Finding:
     size_mb = sum(path.stat().st_blocks * 512 for path in stale if path.exists()) / 1e6
     fix = f'when no ROS 2 program runs: rm {folder}/fastrtps_* {folder}/sem.fastrtps_*'
     text = f'{len(stale)} left behind by killed processes, {size_mb:.1f} MB'
-    return Finding('stale segments', size_mb < _SHM_MB, text, fix, needed=False)
+    return Finding('stale segments', size_mb < ENOUGH_SHARED_MB, text, fix, needed=False)
 
 
 def check_ports() -> Finding:
@@ -126,7 +136,7 @@ def check_ports() -> Finding:
 
 def check_discovery() -> Finding:
     """Send images from one process to another, and count those that arrive."""
-    command = [sys.executable, '-m', image_stream.__name__]
+    command = module_command(image_stream.__name__)
     receiver = subprocess.Popen(
         [*command, image_stream.RECEIVE],
         stdout=subprocess.PIPE,
@@ -160,9 +170,7 @@ def check_graphics() -> Finding:
     if not is_installed('ja_sim'):
         text = 'not checked: the simulator is not installed'
         return Finding('graphics', True, text, needed=False)
-    found = subprocess.run(
-        [sys.executable, '-c', _RENDER], capture_output=True, text=True, check=False
-    )
+    found = subprocess.run(code_command(_RENDER), capture_output=True, text=True, check=False)
     if found.stdout.strip() == 'True':
         backend = os.environ.get('MUJOCO_GL') or 'chosen by the sim'
         return Finding('graphics', True, f'an image is rendered (MUJOCO_GL: {backend})')

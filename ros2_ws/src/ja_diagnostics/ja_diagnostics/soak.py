@@ -20,6 +20,7 @@ from ja_common.graph_node import GraphNode
 from ja_common.private_context import private_executor
 from ja_common.topics import DIAGNOSTICS
 from ja_runner.node_spec import NodeSpec
+from ja_runner.running_nodes import claim_names
 from ja_runner.supervisor import Supervisor
 
 COLUMNS = ('what', 'begin', 'end', 'growth an hour', 'unit')
@@ -72,15 +73,16 @@ class Soak:
     """A graph with one process for each node, and samples of its use of the machine."""
 
     def __init__(self, graph: list[NodeSpec], folder: Path, report: Callable[[str], None]) -> None:
+        self._graph = graph
         self._folder = folder
-        self._supervisor = Supervisor(graph, folder / 'log', 'stop', report)
+        self._supervisor = Supervisor(graph, folder / 'log', report=report)
         self._samples: dict[tuple[str, str], Series] = {}
         self._busy_s: dict[str, float] = defaultdict(float)
         self._sampled_s = 0.0
 
     def run(self, seconds: float) -> int:
         """Run the graph for so many seconds and sample it; return the exit code of the graph."""
-        with private_executor() as executor:
+        with claim_names(self._graph), private_executor() as executor:
             rates = Rates(executor.context)
             executor.add_node(rates)
             end_s = time.monotonic() + seconds

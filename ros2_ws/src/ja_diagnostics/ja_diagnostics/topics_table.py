@@ -15,6 +15,7 @@ from ja_common.core.config import ConfigError
 from ja_common.message_types import message_class
 from ja_common.private_context import private_executor
 from ja_common.qos_text import common_profile
+from ja_common.stop_signals import StopSignals
 from ja_common.topics import TOPICS
 
 _DISCOVERY_S = 0.6
@@ -35,10 +36,10 @@ class TopicRow:
 
 def measure_topics(seconds: float, arguments: Sequence[str] = ()) -> list[TopicRow]:
     """Watch the graph for some seconds; return its topics by name, none if no node is there."""
-    with private_executor(arguments) as executor:
+    with StopSignals() as stop, private_executor(arguments) as executor:
         node = Node('topics_table', context=executor.context, enable_rosout=False)
         executor.add_node(node)
-        _spin(executor, _DISCOVERY_S)
+        _spin(executor, stop, _DISCOVERY_S)
         published = {
             name: types[0]
             for name, types in node.get_topic_names_and_types()
@@ -49,7 +50,7 @@ def measure_topics(seconds: float, arguments: Sequence[str] = ()) -> list[TopicR
             name for name, kind in published.items() if not _count(node, name, kind, counts)
         ]
         began_s = time.monotonic()
-        _spin(executor, seconds)
+        _spin(executor, stop, seconds)
         elapsed_s = time.monotonic() - began_s
         rates = {name: None if name in unknown else counts[name] / elapsed_s for name in published}
         return [_row(node, name, published[name], rates[name]) for name in sorted(published)]
@@ -111,7 +112,9 @@ def _quality(profile: QoSProfile) -> str:
     return ('reliable' if reliable else 'best effort') + (', latched' if latched else '')
 
 
-def _spin(executor: Executor, seconds: float) -> None:
+def _spin(executor: Executor, stop: StopSignals, seconds: float) -> None:
+    stop.call_at_request(executor.wake)
     end_s = time.monotonic() + seconds
     while (left_s := end_s - time.monotonic()) > 0:
+        stop.raise_if_requested()
         executor.spin_once(timeout_sec=left_s)

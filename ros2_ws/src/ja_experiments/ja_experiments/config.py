@@ -28,7 +28,9 @@ class TaskConfig(Configuration):
     Objects are placed within the ranges of the scene in which the looks were rendered.
     """
 
-    objects: int = parameter(5, 'objects in the environment, the attended one included', low=1)
+    objects: int = parameter(
+        5, 'objects in the environment, the attended one included', low=1, high=100
+    )
     reliability: float = parameter(
         1.0, 'share of the trials in which the caregiver looks at the attended object',
         low=0.0, high=1.0,

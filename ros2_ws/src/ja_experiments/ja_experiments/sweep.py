@@ -3,94 +3,30 @@
 A cell is one run: one set of settings, one seed. Its row is written to its own file as soon as it
 is finished. A sweep that was killed continues with the missing cells. At the end all rows become
 one Parquet table.
-
-    reading: last           # 'all' or 'last' pairs; where the grid starts from
-    trials: 300000
-    seeds: 5                # or a list
-    scene: default
-    grid:                   # any parameter of the experiment, by its name
-      objects: [1, 5, 10]
-      learning_rate: [0.003, 0.01]
 """
 
 from __future__ import annotations
 
 import hashlib
-import itertools
 import json
-import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pyarrow
 import pyarrow.parquet
-import yaml
 from distributed import Client, LocalCluster, as_completed
 
 from ja_common.core.config import ConfigError
-from ja_experiments.config import READINGS, ExperimentConfig, reading
+from ja_common.core.files import write_file
+from ja_common.core.safe_files import load_json
 from ja_experiments.paper.experiment import BLOCKS, STAGES, Materials, Plan, run_seed
 from ja_experiments.progress_bars import ProgressBars
+from ja_experiments.sweep_grid import Cell, Grid
 
 TABLE_NAME = 'results.parquet'
 _CELLS = 'cells'
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One run of a sweep: its changes to the reading, and its seed."""
-
-    reading: str
-    trials: int
-    settings: dict[str, Any]
-    seed: int
-
-    def config(self) -> ExperimentConfig:
-        """Return the configuration of the run."""
-        return reading(self.reading).with_settings(self.settings)
-
-
-@dataclass(frozen=True)
-class Grid:
-    """A sweep: its cells, and the scene of the looks that all of them learn from."""
-
-    scene: str
-    cells: tuple[Cell, ...]
-
-
-def read_grid(path: Path) -> Grid:
-    """Read a sweep from YAML. Raises ConfigError that names the file and the error."""
-    try:
-        text = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (OSError, yaml.YAMLError) as error:
-        raise ConfigError(f'{path} cannot be read: {error}') from None
-    known = {'reading': 'all', 'trials': 300_000, 'seeds': 10, 'scene': 'default', 'grid': {}}
-    if not isinstance(text, dict) or not set(text) <= set(known):
-        raise ConfigError(f'{path} must hold a table with {", ".join(known)} and nothing else')
-    given = {**known, **text}
-    if given['reading'] not in READINGS:
-        raise ConfigError(f'{path}: reading must be one of {", ".join(READINGS)}')
-    seeds = range(given['seeds']) if isinstance(given['seeds'], int) else given['seeds']
-    cells = [
-        Cell(given['reading'], given['trials'], settings, seed)
-        for settings in _combinations(given['grid'])
-        for seed in seeds
-    ]
-    for cell in cells:
-        try:
-            cell.config()
-        except ConfigError as error:
-            raise ConfigError(f'{path}: {error}') from None
-    return Grid(given['scene'], tuple(cells))
-
-
-def _combinations(axes: dict[str, list[Any]]) -> Iterator[dict[str, Any]]:
-    values = [axis if isinstance(axis, list) else [axis] for axis in axes.values()]
-    for chosen in itertools.product(*values):
-        yield dict(zip(axes, chosen, strict=True))
 
 
 def run_sweep(
@@ -112,9 +48,18 @@ def run_sweep(
     if missing:
         with _client(scheduler, workers) as client:
             _run_cells(client, missing, materials, progress)
-    rows = [json.loads(path.read_text(encoding='utf-8')) for path in files]
-    pyarrow.parquet.write_table(pyarrow.Table.from_pylist(rows), folder / TABLE_NAME)
+    pyarrow.parquet.write_table(_table(files), folder / TABLE_NAME)
     return folder / TABLE_NAME
+
+
+def _table(files: Iterable[Path]) -> pyarrow.Table:
+    """Return the rows of all cells. Raises ConfigError when one of the files is damaged."""
+    try:
+        return pyarrow.Table.from_pylist([load_json(path) for path in files])
+    except (ConfigError, pyarrow.ArrowException) as error:
+        raise ConfigError(
+            f'{error}: delete the damaged cell, and the same command runs it again'
+        ) from None
 
 
 def run_cell(cell: Cell, materials: Materials) -> dict[str, Any]:
@@ -154,10 +99,8 @@ def _run_cells(
 
 
 def _write_row(path: Path, row: dict[str, Any]) -> None:
-    """Write the row of a finished cell in one atomic step."""
-    temporary = path.with_suffix(f'.{os.getpid()}')
-    temporary.write_text(json.dumps(row), encoding='utf-8')
-    os.replace(temporary, path)
+    """Write the row of a finished cell, whole or not at all. Raises SaveError."""
+    write_file(path, json.dumps(row))
 
 
 def _key(cell: Cell, materials: Materials) -> str:
@@ -173,7 +116,11 @@ def _key(cell: Cell, materials: Materials) -> str:
 @contextmanager
 def _client(scheduler: str | None, workers: int) -> Iterator[Client]:
     if scheduler is not None:
-        with Client(scheduler) as client:
+        try:
+            client = Client(scheduler)
+        except (OSError, ValueError) as error:
+            raise ConfigError(f'no Dask scheduler at {scheduler}: {error}') from None
+        with client:
             yield client
         return
     with (

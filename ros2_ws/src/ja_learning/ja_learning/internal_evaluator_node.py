@@ -3,8 +3,9 @@
 from typing import Any
 
 from ja_common.detection_codec import decode_detections
-from ja_common.graph_node import GraphNode, spin_node
+from ja_common.graph_node import GraphNode
 from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.node_main import spin_node
 from ja_common.synchroniser import StampedSet, Synchroniser
 from ja_common.topics import DETECTIONS, FIXATION
 from ja_learning.core.evaluator import EvaluatorConfig, InternalEvaluator

@@ -15,9 +15,10 @@ from ja_common.core.detection import Detection, caregiver_face, objects
 from ja_common.core.health import Level
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_common.detection_codec import decode_detections
-from ja_common.graph_node import GraphNode, spin_node
+from ja_common.graph_node import GraphNode
 from ja_common.image_codec import decode_image
 from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.node_main import spin_node
 from ja_common.point_cloud_codec import encode_columns
 from ja_common.realtime import enable_realtime_scheduling
 from ja_common.synchroniser import StampedSet, Synchroniser

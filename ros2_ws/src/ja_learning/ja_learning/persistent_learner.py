@@ -1,11 +1,14 @@
 """The learner of a node: it learns in a thread of its own, and is saved in checkpoints."""
 
 from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
 from std_srvs.srv import Trigger
 
+from ja_common.core.background_save import RETRY_S
 from ja_common.core.health import Level
 from ja_common.graph_node import GraphNode
 from ja_common.realtime import use_default_scheduling
@@ -44,6 +47,11 @@ class PersistentLearner:
         if self._checkpoints is not None and self._checkpoints.config.resume:
             self._resume(learner)
         self._background = self._in_background(learner)
+        self._unsaved = ''  # why the last save failed, until one succeeds
+        self._was_unsaved = False
+        self._retry: Future[None] | None = None
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(RETRY_S, self._report_save, clock=steady)
         self.report_health()
         node.advertise_service(Trigger, 'save_checkpoint', self._on_save)
         node.advertise_service(Trigger, 'load_checkpoint', self._on_load)
@@ -62,11 +70,10 @@ class PersistentLearner:
         self._replace(self._make())
         if self._checkpoints is None:
             return
-        try:
-            self._background.call_with_learner(self._checkpoints.save)
-        except (ValueError, OSError) as error:
-            text = f'a restart would bring back what was forgotten: {error}'
-            self._node.report_problem('checkpoints', text)
+        self._background.call_with_learner(self._save)
+        if self._unsaved:
+            text = f'a restart would bring back what was forgotten: {self._unsaved}'
+            self._node.report_problem('saving', text)
 
     def report_health(self) -> None:
         """Put the progress of learning, and its errors, into the node's health."""
@@ -87,10 +94,12 @@ class PersistentLearner:
             self._node.report_problem('learning', f'{lost} trials were not learned before the end')
         if self._checkpoints is None:
             return
-        try:
-            self._checkpoints.save_when_changed(learner)
-        except (ValueError, OSError) as error:
-            self._node.report_problem('checkpoints', f'the last trials are lost: {error}')
+        # After a failure also an equal count of trials may be of another learner.
+        save = self._checkpoints.save if self._unsaved else self._checkpoints.save_when_changed
+        self._try(save, learner)
+        if self._unsaved:
+            text = f'the trials since the last checkpoint are lost: {self._unsaved}'
+            self._node.report_problem('lost trials', text)
         self._checkpoints.close()
 
     def _open(self, config: CheckpointConfig) -> CheckpointFolder | None:
@@ -109,8 +118,32 @@ class PersistentLearner:
     def _after_update(self, learner: Learner) -> None:
         """Run in the thread that learns."""
         self._node.health.values['last error [rad]'] = f'{learner.last_error_rad:.3f}'
-        if self._checkpoints is not None:
-            self._checkpoints.save_when_due(learner)
+        # A save that failed is tried again by the clock, not after every trial.
+        if self._checkpoints is not None and not self._unsaved:
+            self._try(self._checkpoints.save_when_due, learner)
+
+    def _save(self, learner: Learner) -> None:
+        self._try(self._kept_in().save, learner)
+
+    def _try(self, save: Callable[[Learner], object], learner: Learner) -> None:
+        """Save, or keep why that failed; run in the thread that learns while there is one."""
+        try:
+            save(learner)
+        except (ValueError, OSError) as error:
+            self._unsaved = str(error)
+        else:
+            self._unsaved = ''
+
+    def _report_save(self) -> None:
+        """Report a save that failed, and try it again, until one succeeds."""
+        if self._unsaved:
+            self._node.report_problem('saving', self._unsaved)
+            if self._retry is None or self._retry.done():
+                self._retry = self._background.call_later(self._save)
+        elif self._was_unsaved:
+            self._node.health.clear_problem('saving')
+            self._node.get_logger().info('checkpoints are saved again')
+        self._was_unsaved = bool(self._unsaved)
 
     def _kept_in(self) -> CheckpointFolder:
         if self._checkpoints is None:

@@ -5,13 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException
 from std_msgs.msg import Header
 
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.config import Configuration, parameter
-from ja_common.graph_node import GraphNode, spin_node
+from ja_common.graph_node import GraphNode
 from ja_common.image_codec import encode_camera_info, encode_image
+from ja_common.node_main import spin_node
 from ja_common.topics import CAMERA_INFO, IMAGE
 from ja_perception.core.frame_sources import SourceError, open_source
 
@@ -51,7 +53,9 @@ class CameraNode(GraphNode):
         self._image_publisher = self.create_topic_publisher(IMAGE)
         self._info_publisher = self.create_topic_publisher(CAMERA_INFO)
         rate_hz = config.rate_hz or self._source.rate_hz or 15.0
-        self.create_timer(1 / rate_hz, self._publish_next)
+        # A camera delivers whatever the clocks do: only the stamps follow them.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(1 / rate_hz, self._publish_next, clock=steady)
 
     def _publish_next(self) -> None:
         try:

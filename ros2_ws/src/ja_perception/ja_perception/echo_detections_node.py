@@ -8,7 +8,8 @@ from sensor_msgs.msg import PointCloud2
 
 from ja_common.core.detection import Detection
 from ja_common.detection_codec import decode_detections
-from ja_common.graph_node import GraphNode, spin_node
+from ja_common.graph_node import GraphNode
+from ja_common.node_main import spin_node
 from ja_common.time_codec import to_ns
 from ja_common.topics import DETECTIONS
 

@@ -19,7 +19,7 @@ from ja_common.core.config import Configuration, parameter
 from ja_common.core.detection import Detection, caregiver_face
 from ja_common.core.health import Level
 from ja_common.detection_codec import encode_detections
-from ja_common.graph_node import GraphNode, spin_node
+from ja_common.graph_node import GraphNode
 from ja_common.image_codec import (
     decode_camera_info,
     decode_compressed,
@@ -27,6 +27,7 @@ from ja_common.image_codec import (
     encode_image,
 )
 from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.node_main import spin_node
 from ja_common.synchroniser import StampedSet, Synchroniser
 from ja_common.topics import (
     CAMERA_INFO,

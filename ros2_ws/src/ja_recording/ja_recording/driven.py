@@ -10,9 +10,29 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 
+from ja_common.core.config import ConfigError
 from ja_common.message_types import message_class
 from ja_common.private_context import private_context
 from ja_recording.core.reader import RecordedMessage
+
+
+def decoded(message: RecordedMessage, kind: Any) -> Any:
+    """Return a recorded message as one of this class.
+
+    Raises ConfigError when it was recorded as another type, or when its bytes are none.
+    """
+    topic = message.topic
+    if message_class(topic.type_name) is not kind:
+        raise ConfigError(
+            f'{topic.name} was recorded as {topic.type_name}; {kind.__name__} is needed: the '
+            'recording is of another graph'
+        )
+    try:
+        return deserialize_message(message.data, kind)
+    except Exception as error:  # what rclpy raises depends on the middleware
+        raise ConfigError(
+            f'{topic.name}: the message at {message.stamp_ns} ns is damaged: {error}'
+        ) from None
 
 
 class DrivenNode:
@@ -30,7 +50,9 @@ class DrivenNode:
         self.node = make_node(context=context, cli_args=cli, use_global_arguments=False)
         self._callbacks = defaultdict(list)
         for subscription in self.node.subscriptions:
-            self._callbacks[subscription.topic_name].append(subscription.callback)
+            self._callbacks[subscription.topic_name].append(
+                (subscription.msg_type, subscription.callback)
+            )
         self._published: list[tuple[str, Any]] = []
         for publisher in self.node.publishers:
             publisher.publish = partial(self._keep, publisher.topic_name)
@@ -41,12 +63,12 @@ class DrivenNode:
         return set(self._callbacks)
 
     def process_message(self, message: RecordedMessage) -> list[tuple[str, Any]]:
-        """Call the node with a message; return what it publishes then: (topic, message)."""
-        if message.topic.name in self._callbacks:
-            kind = message_class(message.topic.type_name)
-            decoded = deserialize_message(message.data, kind)
-            for callback in self._callbacks[message.topic.name]:
-                callback(decoded)
+        """Call the node with a message; return what it publishes then: (topic, message).
+
+        Raises ConfigError as `decoded`.
+        """
+        for kind, callback in self._callbacks.get(message.topic.name, ()):
+            callback(decoded(message, kind))
         published, self._published = self._published, []
         return published
 

@@ -1,10 +1,12 @@
 """A learner's curve over recorded trials: on each it proposes first, then it learns from it."""
 
 import csv
+import io
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
+from ja_common.core.files import write_file
 from ja_common.core.geometry import angle_between
 from ja_common.core.statistics import Rate
 from ja_recording.core.reader import Recording
@@ -49,13 +51,17 @@ def score_learner(
 
 
 def write_csv(trials: Sequence[ScoredTrial], path: Path) -> None:
-    """Write one row a trial; without truth, the fields that need it are empty."""
-    with path.open('w', newline='') as file:
-        writer = csv.DictWriter(file, [field.name for field in fields(ScoredTrial)])
-        writer.writeheader()
-        for trial in trials:
-            row = asdict(trial)
-            writer.writerow({k: int(v) if isinstance(v, bool) else v for k, v in row.items()})
+    """Write one row a trial; without truth, the fields that need it are empty.
+
+    Raises SaveError.
+    """
+    text = io.StringIO(newline='')
+    writer = csv.DictWriter(text, [field.name for field in fields(ScoredTrial)])
+    writer.writeheader()
+    for trial in trials:
+        row = asdict(trial)
+        writer.writerow({k: int(v) if isinstance(v, bool) else v for k, v in row.items()})
+    write_file(path, text.getvalue())
 
 
 def success_rate(trials: Sequence[ScoredTrial], of: str = 'success') -> Rate:

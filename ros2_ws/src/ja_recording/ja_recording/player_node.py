@@ -7,12 +7,12 @@ from typing import Any
 
 from rclpy.clock import Clock as RosClock
 from rclpy.clock import ClockType
-from rclpy.executors import ExternalShutdownException
 from rosgraph_msgs.msg import Clock
 
 from ja_common.core.config import ConfigError, Configuration, parameter
-from ja_common.graph_node import GraphNode, spin_node
+from ja_common.graph_node import GraphNode
 from ja_common.message_types import message_class
+from ja_common.node_main import spin_node
 from ja_common.qos_text import profile_of
 from ja_common.time_codec import to_time
 from ja_common.topics import CLOCK, Topic
@@ -81,9 +81,11 @@ class PlayerNode(GraphNode):
         if self._makes_clock and self.position_s >= 0:
             self._clock_publisher.publish(Clock(clock=to_time(now_ns)))
         while self._next is not None and self._next.stamp_ns <= now_ns:
-            self._publisher_of[self._next.topic.name].publish(self._next.data)
-            self.played += 1
+            message = self._next
+            # Before it is published: a message that cannot be must not come again for ever.
             self._next = next(self._messages, None)
+            self._publisher_of[message.topic.name].publish(message.data)
+            self.played += 1
 
 
 def chosen_topics(recording: Recording, without: list[str]) -> dict[str, RecordedTopic]:
@@ -105,7 +107,7 @@ class _EndingPlayer(PlayerNode):
     def _publish_due(self) -> None:
         super()._publish_due()
         if self.done:
-            raise ExternalShutdownException
+            self.context.try_shutdown()
 
 
 def main(args: list[str] | None = None) -> None:

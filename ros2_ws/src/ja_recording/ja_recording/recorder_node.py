@@ -13,8 +13,10 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 
 from ja_common.core.config import ConfigError, Configuration, parameter
 from ja_common.core.health import Level
-from ja_common.graph_node import GraphNode, spin_node
+from ja_common.core.run_folder import new_run_folder
+from ja_common.graph_node import GraphNode
 from ja_common.message_types import message_class, schema_of
+from ja_common.node_main import spin_node
 from ja_common.qos_text import common_profile, offered_text
 from ja_recording.background_writer import BackgroundWriter, QueuedMessage
 from ja_recording.recording_folder import Channel, Limits, RecordingFolder
@@ -51,12 +53,13 @@ class RecorderNode(GraphNode):
             self._exclude = re.compile(config.exclude) if config.exclude else None
         except re.error as error:
             raise ConfigError(f'exclude = {config.exclude!r}: {error}') from None
-        name = config.folder or f'runs/{time.strftime("%Y%m%d-%H%M%S")}-record'
-        self.folder = Path(name).expanduser()
+        given = Path(config.folder).expanduser() if config.folder else None
+        self.folder = given or new_run_folder('record')
         limits = Limits(config.split_mb, config.split_s, config.keep_mb, config.keep_s)
         self.writer = BackgroundWriter(
             RecordingFolder(self.folder, limits), int(config.queue_mb * 1e6)
         )
+        self._began_s = time.monotonic()
         self._began_ns = time.time_ns()
         self._known: set[str] = set()
         self.create_timer(
@@ -67,7 +70,7 @@ class RecorderNode(GraphNode):
     @property
     def elapsed_s(self) -> float:
         """Return the time since the recording began [s]."""
-        return 1e-9 * (time.time_ns() - self._began_ns)
+        return time.monotonic() - self._began_s
 
     @property
     def topics(self) -> int:

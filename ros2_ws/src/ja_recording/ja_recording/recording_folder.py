@@ -10,6 +10,7 @@ import yaml
 from mcap.writer import CompressionType, Writer
 
 from ja_common.core.config import ConfigError
+from ja_common.core.safe_files import parse_yaml
 from ja_common.message_types import schema_of
 
 _MB = 10**6
@@ -173,9 +174,7 @@ class RecordingFolder:
                             'name': channel.topic,
                             'type': channel.type_name,
                             'serialization_format': 'cdr',
-                            'offered_qos_profiles': yaml.safe_load(channel.offered_qos) or []
-                            if channel.offered_qos
-                            else [],
+                            'offered_qos_profiles': _profiles(channel),
                             'type_description_hash': channel.type_hash,
                         },
                         'message_count': counts[channel.topic],
@@ -190,3 +189,7 @@ class RecordingFolder:
                 'ros_distro': 'jazzy',
             }
         }
+
+
+def _profiles(channel: Channel) -> list[Any]:
+    return parse_yaml(channel.offered_qos, channel.topic) or []

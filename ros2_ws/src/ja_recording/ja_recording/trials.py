@@ -15,25 +15,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rclpy.serialization import deserialize_message
 
 from ja_common.core.config import ConfigError
 from ja_common.core.detection import caregiver_face
 from ja_common.core.geometry import angle_between
 from ja_common.detection_codec import decode_detections
 from ja_common.joint_codec import JointCodec, JointConfig
-from ja_common.message_types import message_class
 from ja_common.status_values import status_values
 from ja_common.time_codec import to_ns
 from ja_common.topics import DETECTIONS, FIXATION, GATE_STATUS, JOINT_STATES, LM_DELTA, SIM_TRUTH
 from ja_learning.core.trial import Trial
 from ja_recording.core.reader import RecordedMessage, Recording
-from ja_recording.driven import DrivenNode, driven
+from ja_recording.driven import DrivenNode, decoded, driven
 
 if TYPE_CHECKING:  # a rig without the simulator has recordings without a truth
     from ja_sim.core.score import TruthAt
 
 _NEEDED = (DETECTIONS, FIXATION, JOINT_STATES)
+# What is read beside what the learner reads: types by topic.
+_FOLLOWED = {topic.name: topic.type for topic in (SIM_TRUTH, GATE_STATUS, DETECTIONS)}
 _SHIFTS = ('VF', 'LM')
 # How many images the learner's answer to an image may come later than the truth about it.
 _TRUTHS_KEPT = 100
@@ -124,19 +124,16 @@ class TrialExtractor:
         self._source: str | None = None
 
     def process_message(self, topic: str, message: RecordedMessage) -> Iterator[RecordedTrial]:
-        """Use one message, then hand it to the learner; yield the trials that it has ended."""
-        decoded = deserialize_message(message.data, message_class(message.topic.type_name))
-        if topic == SIM_TRUTH.name:
-            from ja_sim.truth_codec import decode_truth
+        """Use one message, then hand it to the learner; yield the trials that it has ended.
 
-            self._truths.append(decode_truth(decoded))
-        elif topic == GATE_STATUS.name:
-            source = status_values(decoded).get('source')
-            self._source = source if source in _SHIFTS else self._source
-        elif topic == DETECTIONS.name:
-            face = caregiver_face(decode_detections(decoded))
-            if face is not None and face.attended:
-                self._looks_at, self._source = to_ns(decoded.header.stamp), None
+        Raises ConfigError when the message is damaged.
+        """
+        if topic in _FOLLOWED:
+            content = decoded(message, _FOLLOWED[topic])
+            try:
+                self._follow(topic, content)
+            except ValueError as error:
+                raise ConfigError(f'/{topic} at {message.stamp_ns} ns: {error}') from None
         for answer_topic, answer in self._learner.process_message(message):
             if answer_topic.lstrip('/') == LM_DELTA.name:
                 self._on_proposal(answer)
@@ -144,6 +141,19 @@ class TrialExtractor:
             trial, stamp_ns = self._ended.pop(0)
             if trial.fixation is not None and (look := self._pop_look()) is not None:
                 yield self._recorded_trial(trial, look, stamp_ns)
+
+    def _follow(self, topic: str, content: Any) -> None:
+        if topic == SIM_TRUTH.name:
+            from ja_sim.truth_codec import decode_truth
+
+            self._truths.append(decode_truth(content))
+        elif topic == GATE_STATUS.name:
+            source = status_values(content).get('source')
+            self._source = source if source in _SHIFTS else self._source
+        else:
+            face = caregiver_face(decode_detections(content))
+            if face is not None and face.attended:
+                self._looks_at, self._source = to_ns(content.header.stamp), None
 
     def _on_proposal(self, message: Any) -> None:
         delta = self._joints.decode(message)

@@ -1,6 +1,7 @@
 """`python -m ja_runner.child MODULE ARGS`: run a node; it ends with its parent."""
 
 import ctypes
+import faulthandler
 import importlib
 import os
 import signal
@@ -8,6 +9,9 @@ import sys
 
 _PR_SET_PDEATHSIG = 1
 PARENT = 'JA_PARENT_PID'
+
+STACK_SIGNAL = signal.SIGUSR1
+"""At this signal a node writes the stack of each thread to its log, and runs on."""
 
 
 def end_with_parent(parent: int) -> None:
@@ -24,18 +28,29 @@ def end_with_parent(parent: int) -> None:
 
 def main() -> None:
     """Run the `main` of the node's module, which the command line names."""
+    # Until the node takes over, a signal ends this process without a word: nothing is to be saved
+    # yet, and Python's handler would end an import with a traceback. The supervisor has blocked
+    # SIGINT until here, because Python sets its handler before any line of ours.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    faulthandler.enable()
+    faulthandler.register(STACK_SIGNAL)
     module = sys.argv[1]
     if PARENT in os.environ:
         end_with_parent(int(os.environ[PARENT]))
     sys.argv = [module, *sys.argv[2:]]
-    node = importlib.import_module(module)
-    try:
-        # The supervisor starts this process with SIGINT blocked, because SIGINT during an import
-        # would end in a traceback. A SIGINT that arrived meanwhile is delivered here.
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-        node.main()
-    except KeyboardInterrupt:
-        pass
+    importlib.import_module(module).main()
+    _end()
+
+
+def _end() -> None:
+    """End without the interpreter's own end, which takes seconds with torch on a busy machine.
+
+    The node has ended, and with it its participant of DDS, its threads and its files.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)
 
 
 if __name__ == '__main__':

@@ -5,8 +5,8 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+from ja_runner.node_process import Death, NodeProcess
 from ja_runner.node_spec import NodeSpec
-from ja_runner.supervisor import Death, NodeProcess
 
 _PATIENCE_S = 3.0
 
@@ -35,8 +35,7 @@ class Companion:
     def report_events(self) -> None:
         """Report the announcement and the death of the node, each once, when it has happened."""
         if self._announcement:
-            lines = self._log.read_text(errors='replace').splitlines(keepends=True)
-            for line in lines:
+            for line in self._log_lines():
                 if line.startswith(self._announcement) and line.endswith('\n'):
                     self._announcement = ''
                     self._report(line.strip())
@@ -46,7 +45,19 @@ class Companion:
             self._alive = False
             self._report(str(Death(self._spec.executable, returncode, self._process.last_lines())))
 
+    def _log_lines(self) -> list[str]:
+        try:
+            return self._log.read_text(errors='replace').splitlines(keepends=True)
+        except OSError:  # the log was removed, or could not be written
+            return []
+
     def __exit__(self, *_: object) -> None:
+        try:
+            self._end()
+        finally:
+            self._process.close()
+
+    def _end(self) -> None:
         for number in (signal.SIGINT, signal.SIGKILL):
             self._process.send_signal(number)
             try:

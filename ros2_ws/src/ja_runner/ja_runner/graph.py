@@ -6,9 +6,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from ja_common.core.config import ConfigError
+from ja_common.core.safe_files import load_yaml
 from ja_runner.node_spec import NodeSpec
 from ja_runner.parts import is_installed
 
@@ -40,11 +39,17 @@ def replace_nodes(graph: Sequence[NodeSpec], replacements: Sequence[str]) -> lis
         if not (package and executable and is_installed(f'{package}.{executable}_node')):
             raise ConfigError(
                 f'{replacement}: write NODE=PACKAGE/EXECUTABLE, where Python finds a file '
-                'PACKAGE/EXECUTABLE_node.py (PYTHONPATH)'
+                'PACKAGE/EXECUTABLE_node.py; PYTHONPATH=. before the command lets it search the '
+                'current folder'
             )
         others[ours] = package, executable
     return [
-        replace(node, package=others[node.executable][0], executable=others[node.executable][1])
+        replace(
+            node,
+            package=others[node.executable][0],
+            executable=others[node.executable][1],
+            has_heartbeat=False,
+        )
         if node.executable in others
         else node
         for node in graph
@@ -58,7 +63,7 @@ def preset(path: Path, executable: str) -> dict[str, Any]:
     passed with `-p` and not as a file: rcl prefers a file's section for one node to any `-p`, so
     a `-p` of the user would not override our file.
     """
-    sections = yaml.safe_load(path.read_text())
+    sections = load_yaml(path)
     parameters: dict[str, Any] = {}
     for section in ('/**', f'/**/{executable}'):
         parameters |= sections.get(section, {}).get('ros__parameters', {})

@@ -1,11 +1,11 @@
 """What a node of a graph is: its executable, its parameters, its remappings."""
 
 import importlib
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from ja_common.python_command import module_command
 from ja_common.ros_arguments import parameter_arguments
 
 
@@ -16,7 +16,7 @@ class NodeSpec:
     `executable` is the name of the executable: the file's name without `_node`, and the node's
     name unless it is remapped. `arguments` are further ROS arguments, the user's (`-r`, `-p`,
     `--params-file`); they stand last, so that they win. `environ` is added to the process's
-    environment.
+    environment. `has_heartbeat`: the process is known to send heartbeats (`ja_common.node_main`).
     """
 
     package: str
@@ -25,6 +25,7 @@ class NodeSpec:
     remappings: Mapping[str, str] = field(default_factory=dict)
     arguments: Sequence[str] = ()
     environ: Mapping[str, str] = field(default_factory=dict)
+    has_heartbeat: bool = True
 
     @property
     def module(self) -> str:
@@ -48,7 +49,7 @@ class NodeSpec:
 
         The process ends with the process that starts it.
         """
-        return [sys.executable, '-m', 'ja_runner.child', self.module, *self.ros_arguments()]
+        return module_command('ja_runner.child', self.module, *self.ros_arguments())
 
     def load(self) -> type:
         """Import and return the node's class, for the composition in one process."""

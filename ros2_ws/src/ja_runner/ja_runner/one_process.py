@@ -1,6 +1,5 @@
 """All nodes in one process, on one executor: faster messages, one log, one exit."""
 
-import signal
 from collections.abc import Callable, Sequence
 
 from rclpy.context import Context
@@ -9,6 +8,7 @@ from rclpy.node import Node
 from ja_common.core.config import ConfigError
 from ja_common.executor import CachedWaitSetExecutor
 from ja_common.private_context import private_context
+from ja_common.stop_signals import StopSignals
 from ja_runner.node_spec import NodeSpec
 
 
@@ -18,19 +18,16 @@ def run_in_one_process(
     done: Callable[[], bool],
     report: Callable[[str], None] = print,
 ) -> int:
-    """Run the graph and an observing node until `done()`, SIGINT or SIGTERM.
+    """Run the graph and an observing node until `done()`, SIGINT, SIGTERM or SIGHUP.
 
-    Returns the exit code: 0, or 1 when a node cannot be made (`report` gets one sentence).
+    Returns the exit code: 0, or 2 when a node cannot be made (`report` gets one sentence).
     """
-    stop = _StopSignal()
     try:
-        with private_context() as context:
-            _run_nodes(graph, make_observer, lambda: stop.received or done(), context)
+        with StopSignals() as stop, private_context() as context:
+            _run_nodes(graph, make_observer, lambda: stop.requested or done(), context)
     except (ConfigError, OSError) as error:
         report(f'error: {error}')
-        return 1
-    finally:
-        stop.restore()
+        return 2
     return 0
 
 
@@ -57,21 +54,3 @@ def _run_nodes(
         executor.shutdown()
         for node in reversed(nodes):
             node.destroy_node()
-
-
-class _StopSignal:
-    """SIGINT and SIGTERM as a flag, so that no callback is interrupted."""
-
-    def __init__(self) -> None:
-        self.received = False
-        self._before = {
-            number: signal.signal(number, self._on_signal)
-            for number in (signal.SIGINT, signal.SIGTERM)
-        }
-
-    def _on_signal(self, *_: object) -> None:
-        self.received = True
-
-    def restore(self) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)

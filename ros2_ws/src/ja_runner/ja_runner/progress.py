@@ -3,13 +3,15 @@
 import math
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rich.console import Console
 from rich.live import Live
 from rich.table import Table
+from rich.text import Text
 
 from ja_common.core.learning_curve import LearningCurve
 from ja_common.graph_node import GraphNode
@@ -94,6 +96,8 @@ class Display:
         self._console = console or Console()
         self._next_s = 0.0
         self._live: Live | None = None
+        self.reader_has_gone = False
+        """Whether the pipe that the output goes to was closed at its other end."""
 
     def __enter__(self) -> 'Display':
         if self._console.is_terminal:
@@ -103,11 +107,16 @@ class Display:
 
     def __exit__(self, *_: object) -> None:
         if self._live is not None:
-            self._live.stop()
+            with self._outlive_the_output():
+                self._live.stop()
 
     def print_line(self, text: str) -> None:
         """Print a line that stays above the live table."""
-        self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+        with self._outlive_the_output():
+            if self._live is None:
+                print(text, file=self._console.file, flush=True)
+            else:
+                self._console.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def update(self, node: ProgressNode) -> None:
         """Show the state of the run, if the last update is old enough."""
@@ -122,5 +131,16 @@ class Display:
         self._next_s = now + _SCREEN_EVERY_S
         table = Table(title=self._title, show_header=False, title_justify='left')
         for name, text in facts.items():
-            table.add_row(name, text)
-        self._live.update(table, refresh=True)
+            table.add_row(Text(name), Text(text))  # not markup: a node may write [/anything]
+        with self._outlive_the_output():
+            self._live.update(table, refresh=True)
+
+    @contextmanager
+    def _outlive_the_output(self) -> Iterator[None]:
+        """Go on without a line that cannot be written: the run is worth more than its lines."""
+        try:
+            yield
+        except BrokenPipeError:
+            self.reader_has_gone = True
+        except OSError:
+            pass  # its disk is full, or its terminal has ended

@@ -1,6 +1,6 @@
 """Run a graph in one process or in many, with its progress on the terminal."""
 
-import time
+import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -9,29 +9,25 @@ from pathlib import Path
 from rclpy.context import Context
 
 from ja_common.core.config import ConfigError
+from ja_common.core.files import check_writable
 from ja_common.core.live_page import LIVE_PAGE
 from ja_common.private_context import private_executor
 from ja_common.ros_arguments import check_ros_arguments
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_runner.companion import Companion
+from ja_runner.image_transport import image_loss_warning
 from ja_runner.node_spec import NodeSpec
 from ja_runner.one_process import run_in_one_process
 from ja_runner.parts import check_installed, is_installed
 from ja_runner.progress import Display, ProgressNode
-from ja_runner.supervisor import OnDeath, Supervisor
+from ja_runner.running_nodes import claim_names
+from ja_runner.supervisor import DEFAULT, Supervision, Supervisor
 
 # Learner and gate save into the same folder, so that both resume from the same trial.
 _MEMORY = {
     'learning_module': {'checkpoint_folder': 'checkpoints'},
     'gate': {'trials_file': 'trials'},
 }
-
-
-def new_run_folder(name: str, parent: Path = Path('runs')) -> Path:
-    """Make the folder `runs/<time>-<name>` and return its path."""
-    folder = parent / f'{time.strftime("%Y%m%d-%H%M%S")}-{name}'
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
 
 
 def run_graph(
@@ -42,12 +38,13 @@ def run_graph(
     *,
     one_process: bool = False,
     view: bool = False,
-    on_death: OnDeath = 'stop',
+    supervision: Supervision = DEFAULT,
     arguments: Sequence[str] = (),
     memory: Path | None = None,
 ) -> tuple[int, ProgressNode]:
     """Run until `done`, a signal, or a death; return the exit code and the progress node.
 
+    Raises ConfigError if nodes of the same names run in this ROS domain already.
     `arguments`: the ROS arguments of all nodes (the progress node gets the namespace as well).
     `memory`: the folder in which learner and gate save what they learned, and from which they
     resume if it is there; by default `folder`.
@@ -56,6 +53,8 @@ def run_graph(
     apply_ros_defaults()
     check_ros_arguments(arguments)
     check_installed(spec.package for spec in graph)
+    for place in {folder, memory or folder}:
+        check_writable(place)
     graph = [_with_memory(spec, (memory or folder).absolute()) for spec in graph]
     progress: list[ProgressNode] = []
 
@@ -64,7 +63,7 @@ def run_graph(
         progress.append(ProgressNode(context=context, cli_args=cli, use_global_arguments=False))
         return progress[0]
 
-    with Display(title) as display, ExitStack() as beside:
+    with claim_names(graph), Display(title) as display, ExitStack() as beside:
         page: Companion | None = None
         if view and not is_installed('ja_dashboard'):
             display.print_line('there is no live page: the dashboard is not installed')
@@ -77,14 +76,16 @@ def run_graph(
             display.update(progress[0])
             if page is not None:
                 page.report_events()
-            return done(progress[0])
+            return display.reader_has_gone or done(progress[0])
 
         if one_process:
             code = run_in_one_process(graph, make_progress_node, is_done, display.print_line)
         else:
             code = _run_processes(
-                graph, folder, make_progress_node, is_done, on_death, display.print_line
+                graph, folder, make_progress_node, is_done, supervision, display.print_line
             )
+    if not progress:  # a node could not be made: the display shows which, and why
+        sys.exit(code)
     return code, progress[0]
 
 
@@ -106,9 +107,11 @@ def _run_processes(
     folder: Path,
     make_progress_node: Callable[[Context], ProgressNode],
     is_done: Callable[[], bool],
-    on_death: OnDeath,
+    supervision: Supervision,
     report: Callable[[str], None],
 ) -> int:
+    if warning := image_loss_warning():
+        report(warning)
     with private_executor() as executor:
         executor.add_node(make_progress_node(executor.context))
 
@@ -116,4 +119,4 @@ def _run_processes(
             executor.spin_once(timeout_sec=0.1)
             return is_done()
 
-        return Supervisor(graph, folder / 'log', on_death, report).run(tick)
+        return Supervisor(graph, folder / 'log', supervision, report).run(tick)

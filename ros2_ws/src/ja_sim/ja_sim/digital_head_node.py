@@ -8,9 +8,10 @@ from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Header
 
 from ja_common.core.config import Configuration, parameter
-from ja_common.graph_node import GraphNode, spin_node
+from ja_common.graph_node import GraphNode
 from ja_common.image_codec import decode_image, encode_camera_info, encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.node_main import spin_node
 from ja_common.time_codec import to_ns
 from ja_common.topics import CAMERA_INFO, IMAGE, JOINT_COMMANDS, JOINT_STATES, WIDE_IMAGE
 from ja_sim.core.digital_head import DigitalHead, DigitalHeadConfig

@@ -1,6 +1,5 @@
 """`scorer`: compares the truth with the fixations; no other node may subscribe to the truth."""
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,17 +9,15 @@ from std_msgs.msg import Float32
 from std_srvs.srv import Trigger
 
 from ja_common.core.config import Configuration, parameter
-from ja_common.graph_node import GraphNode, spin_node
+from ja_common.graph_node import GraphNode
 from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.node_main import spin_node
+from ja_common.reported_save import ReportedSave
 from ja_common.synchroniser import StampedSet, Synchroniser
 from ja_common.topics import FIXATION, SCORE, SIM_TRUTH, SUCCESS_RATE
 from ja_sim.core.score import Score, TrialOutcome
+from ja_sim.core.trial_table import TrialTable
 from ja_sim.truth_codec import decode_truth
-
-_CSV_COLUMNS = (
-    'trial', 'stamp_ns', 'objects', 'in_view', 'success', 'attended_pan_rad', 'attended_tilt_rad',
-    'fixated_pan_rad', 'fixated_tilt_rad',
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -45,32 +42,27 @@ class ScorerNode(GraphNode):
         self._success_rate_publisher = self.create_topic_publisher(SUCCESS_RATE)
         self._score_publisher = self.create_topic_publisher(SCORE)
         self.advertise_service(Trigger, 'sim/reset_score', self._on_reset)
-        self._csv_file = self._open_csv(self._config.csv_file)
+        self._table: TrialTable | None = None
+        if self._config.csv_file:
+            self._table = TrialTable(Path(self._config.csv_file).expanduser())
+            self._table_save = ReportedSave(self, 'csv_file', self._table.save)
 
     def destroy_node(self) -> None:
-        """Close the file, then the node."""
-        if self._csv_file is not None:
-            self._csv_file.close()
+        """Write the rows that are not written yet, then destroy the node."""
+        if self._table is not None:
+            self._table_save.close()
         super().destroy_node()
-
-    def _open_csv(self, path: str) -> Any:
-        if not path:
-            return None
-        Path(path).expanduser().parent.mkdir(parents=True, exist_ok=True)
-        # Line-buffered: every finished trial is on disk at once. Closed by destroy_node.
-        file = open(Path(path).expanduser(), 'w', newline='', buffering=1)  # noqa: SIM115
-        self._csv = csv.writer(file)
-        self._csv.writerow(_CSV_COLUMNS)
-        return file
 
     def _score_image(self, found: StampedSet) -> None:
         outcome = self._score.score_image(found[SIM_TRUTH], found[FIXATION])
-        if outcome is not None:
-            self._publish_score(outcome)
+        if outcome is None:
+            return
+        self._publish_score(outcome)
+        if self._table is not None:
+            self._table.append_trial(outcome)
+            self._table_save.request()
 
     def _publish_score(self, outcome: TrialOutcome) -> None:
-        if self._csv_file is not None:
-            self._csv.writerow(_csv_row(outcome))
         rates = self._score.rates()
         values = {'objects': str(outcome.objects)}
         for name, rate in rates.items():
@@ -96,13 +88,6 @@ class ScorerNode(GraphNode):
         self._score = Score(self._config.window_trials)
         response.success, response.message = True, 'counting from zero'
         return response
-
-
-def _csv_row(outcome: TrialOutcome) -> list[Any]:
-    numbers = [outcome.trial, outcome.stamp_ns, outcome.objects]
-    flags = [int(outcome.in_view), int(outcome.success)]
-    fixated = outcome.fixated or ('', '')  # given up
-    return [*numbers, *flags, *outcome.attended, *fixated]
 
 
 def main(args: list[str] | None = None) -> None:

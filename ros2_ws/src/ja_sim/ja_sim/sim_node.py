@@ -20,9 +20,10 @@ from std_srvs.srv import SetBool, Trigger
 from ja_common.core.config import ConfigError, Configuration, parameter
 from ja_common.core.health import Level
 from ja_common.core.stamps import NS_PER_S
-from ja_common.graph_node import GraphNode, spin_node
+from ja_common.graph_node import GraphNode
 from ja_common.image_codec import encode_camera_info, encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
+from ja_common.node_main import spin_node
 from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import (
     CAMERA_INFO,

@@ -40,6 +40,7 @@ from ja_common.status_values import status_values
 from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import DETECTIONS, DIAGNOSTICS, FACE_IMAGE, FIXATION, JOINT_STATES, LM_DELTA
 from ja_runner.node_spec import NodeSpec
+from ja_runner.running_nodes import claim_names
 from ja_runner.supervisor import Supervisor
 
 RATE_HZ = 30.0
@@ -95,7 +96,9 @@ def _measure(parameters: dict[str, Any]) -> '_LearnerProbe':
 
         kept = {'learner': 'gaze_line', 'checkpoint_folder': f'{folder}/checkpoints'}
         learner = NodeSpec('ja_learning', 'learning_module', {**kept, **parameters})
-        if Supervisor([learner], Path(folder) / 'log').run(tick):
+        with claim_names([learner]):
+            code = Supervisor([learner], Path(folder) / 'log').run(tick)
+        if code:
             raise ConfigError('the learning module did not run to the end of the measurement')
         return watch
 

@@ -3,12 +3,12 @@
 import json
 import os
 import subprocess
-import sys
 
 import numpy as np
 
 from ja_benchmarks.rows import Row, percentile_99, row
 from ja_common.core.config import ConfigError
+from ja_common.python_command import module_command
 from ja_common.ros_defaults import ENVIRONMENT
 from ja_diagnostics import image_stream as _image_stream
 
@@ -46,7 +46,7 @@ def _measure(environ: dict[str, str]) -> dict[str, Row]:
 
 def _start(what: str, environ: dict[str, str], stderr: int | None = None) -> subprocess.Popen:
     return subprocess.Popen(
-        [sys.executable, '-m', _image_stream.__name__, what],
+        module_command(_image_stream.__name__, what),
         env=environ, stdout=subprocess.PIPE, stderr=stderr, text=True,
     )  # fmt: skip
 

@@ -16,11 +16,11 @@ import time
 from collections.abc import Iterator
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
-import yaml
 from builtin_interfaces.msg import Time
 from numpy.typing import NDArray
 from std_msgs.msg import Header
@@ -31,6 +31,7 @@ from ja_common.core.camera_model import CameraModel
 from ja_common.core.detection import Detection, Kind, caregiver_face, objects
 from ja_common.core.geometry import angle_between, directions_of_rays
 from ja_common.core.posture import Posture
+from ja_common.core.safe_files import load_yaml
 from ja_common.detection_codec import encode_detections
 from ja_common.image_codec import decode_image, encode_image
 from ja_perception.core.blazeface import BlazeFace
@@ -233,8 +234,7 @@ class _NoFaces:
 
 @cache
 def _marks() -> dict[str, Any]:
-    text = (files('ja_benchmarks') / 'pictures.yaml').read_text(encoding='utf-8')
-    return yaml.safe_load(text)
+    return load_yaml(Path(str(files('ja_benchmarks') / 'pictures.yaml')))
 
 
 @cache

@@ -30,12 +30,14 @@ def calibrate(
     from ja_calibration.calibration_file import save
     from ja_calibration.run_calibration import run_calibration
     from ja_common.core.config import ConfigError
+    from ja_common.core.files import check_file_writable
     from ja_common.ros_arguments import check_ros_arguments
 
     arguments = context.obj or []
     check_ros_arguments(arguments)
     if not to.absolute().parent.is_dir():
         raise ConfigError(f'{to}: there is no folder {to.absolute().parent}')
+    check_file_writable(to)
     try:
         with Console(stderr=True).status('waiting for images and joint states ...') as status:
             contents = run_calibration(arguments, patience_s, status.update)

@@ -7,8 +7,17 @@ from typing import Annotated
 
 import typer
 
-from ja_bringup.commands.options import OnDeath, OnDeathChoice, OneProcess, Record, Swap, View
+from ja_bringup.commands.options import (
+    HungAfter,
+    OnDeath,
+    OnDeathChoice,
+    OneProcess,
+    Record,
+    Swap,
+    View,
+)
 from ja_runner.graph import RECORDER, replace_nodes, sim_graph, with_arguments
+from ja_runner.supervisor import Supervision
 
 
 class DemoLearner(str, Enum):
@@ -73,8 +82,13 @@ def demo(
     one_process: OneProcess = False,
     view: View = True,
     on_death: OnDeath = OnDeathChoice.stop,
+    hung_after_s: HungAfter = Supervision.hung_after_s,
 ) -> None:
-    """Watch the simulated head learn to follow the caregiver's gaze."""
+    """Watch the simulated head learn to follow the caregiver's gaze.
+
+    Ctrl-C ends it in order. Exit code 0: at least one trial was finished; 1: none was, or a node
+    died, or the success curve could not be written; 2: a setting cannot be used.
+    """
     from ja_bringup.course import standard_course
     from ja_bringup.demo import run_demo
 
@@ -83,4 +97,5 @@ def demo(
     graph = replace_nodes(sim_graph(seed, sim, learner.value), swap or ())
     stages = standard_course(trials or PRACTICE_TRIALS[learner.value], time_s, exam_trials)
     graph = with_arguments([*[RECORDER] * record, *graph], arguments)
-    sys.exit(run_demo(graph, stages, one_process, on_death.value, arguments, view, resume))
+    supervision = Supervision(on_death.value, hung_after_s)
+    sys.exit(run_demo(graph, stages, one_process, supervision, arguments, view, resume))

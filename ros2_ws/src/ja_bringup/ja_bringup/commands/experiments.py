@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import time
+import tempfile
 from pathlib import Path
 from typing import Annotated
 
@@ -41,6 +41,8 @@ def figures(
     output: Annotated[Path | None, typer.Option(help='Folder of the report.')] = None,
 ) -> None:
     """Reproduce Figures 6 and 7 of the paper, without ROS, and write a report."""
+    from ja_common.core.files import SaveError, check_writable
+    from ja_common.core.run_folder import new_run_folder
     from ja_experiments.paper.experiment import Plan
     from ja_experiments.paper.report import write_report
     from ja_experiments.paper.study import StudyConfig, run_study
@@ -55,9 +57,15 @@ def figures(
         ablation_seeds=min(ablations, seeds),
         workers=workers,
     )
+    folder = output or new_run_folder('figures')
+    check_writable(folder)  # now, and not after hours
     study = run_study(config, ProgressBars())
-    folder = output or Path('runs') / f'{time.strftime("%Y%m%d-%H%M%S")}-figures'
-    typer.echo(f'The report: {write_report(study, folder)}')
+    try:
+        report = write_report(study, folder)
+    except SaveError as error:
+        rescued = write_report(study, Path(tempfile.mkdtemp(prefix='joint-attention-figures-')))
+        raise SaveError(f'{error}; until then the report is {rescued}') from None
+    typer.echo(f'The report: {report}')
 
 
 def sweep(
@@ -72,12 +80,15 @@ def sweep(
     ] = None,
 ) -> None:
     """Run a grid of experiments over seeds and parameters; finished runs are not repeated."""
+    from ja_common.core.files import check_writable
     from ja_experiments.paper.study import prepare_materials
     from ja_experiments.progress_bars import ProgressBars
-    from ja_experiments.sweep import read_grid, run_sweep
+    from ja_experiments.sweep import run_sweep
+    from ja_experiments.sweep_grid import read_grid
 
-    grid, progress = read_grid(config), ProgressBars()
-    materials = prepare_materials(grid.scene, looks_seed=0, progress=progress)
     folder = output or Path('runs') / f'sweep-{config.stem}'
+    grid, progress = read_grid(config), ProgressBars()
+    check_writable(folder)
+    materials = prepare_materials(grid.scene, looks_seed=0, progress=progress)
     table = run_sweep(grid, materials, folder, progress, scheduler, workers)
     typer.echo(f'The results: {table}')

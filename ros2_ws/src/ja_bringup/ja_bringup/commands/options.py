@@ -14,6 +14,14 @@ class OnDeathChoice(str, Enum):
 
 
 OnDeath = Annotated[OnDeathChoice, typer.Option(help='What to do when a node dies.')]
+HungAfter = Annotated[
+    float,
+    typer.Option(
+        '--hung-after',
+        min=2.0,
+        help='A node without a sign of life for so many seconds is killed, as one that died.',
+    ),
+]
 OneProcess = Annotated[bool, typer.Option('--one-process', help='All nodes in one process.')]
 Record = Annotated[bool, typer.Option('--record', help='Record all topics into runs/.')]
 View = Annotated[bool, typer.Option(help='Serve the live page, and print its address.')]

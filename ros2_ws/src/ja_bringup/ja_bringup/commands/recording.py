@@ -34,7 +34,10 @@ def record(
 ) -> None:
     """Record every topic of the running graph, of any type, as MCAP."""
     from ja_bringup.record_and_replay import record as run
+    from ja_common.core.files import check_writable
 
+    if output is not None:
+        check_writable(output)
     parameters = {
         'folder': '' if output is None else str(output),
         'exclude': exclude,

@@ -5,8 +5,17 @@ from typing import Annotated
 
 import typer
 
-from ja_bringup.commands.options import OnDeath, OnDeathChoice, OneProcess, Record, Swap, View
+from ja_bringup.commands.options import (
+    HungAfter,
+    OnDeath,
+    OnDeathChoice,
+    OneProcess,
+    Record,
+    Swap,
+    View,
+)
 from ja_runner.graph import RECORDER, replace_nodes, rig_graph, with_arguments
+from ja_runner.supervisor import Supervision
 
 
 def register(app: typer.Typer) -> None:
@@ -31,9 +40,11 @@ def rig(
     one_process: OneProcess = False,
     view: View = True,
     on_death: OnDeath = OnDeathChoice.stop,
+    hung_after_s: HungAfter = Supervision.hung_after_s,
 ) -> None:
     """Run the same graph on real pictures: a digital head in them, or a rig's own motors."""
-    from ja_runner.run import new_run_folder, run_graph
+    from ja_common.core.run_folder import new_run_folder
+    from ja_runner.run import run_graph
 
     arguments = context.obj or []
     graph = replace_nodes(rig_graph(source), swap or ())
@@ -44,7 +55,7 @@ def rig(
         lambda node: 0.0 < time_s < node.elapsed_s,
         one_process=one_process,
         view=view,
-        on_death=on_death.value,
+        supervision=Supervision(on_death.value, hung_after_s),
         arguments=arguments,
     )
     sys.exit(code)

@@ -25,6 +25,7 @@ def faults(
     """
     from rich import box
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     from ja_diagnostics.faults.hosts import CASES, missing, run_on_hosts
@@ -44,7 +45,7 @@ def faults(
                 typer.echo(f'left out: {", ".join(cases)}: {why}')
             else:
                 outcomes += [run_on_hosts(case, folder / case, typer.echo) for case in cases]
-    table = Table(*COLUMNS, box=box.MARKDOWN)
+    table = Table(*map(escape, COLUMNS), box=box.MARKDOWN)
     for outcome in outcomes:
         table.add_row(*outcome.row())
     typer.echo()
@@ -64,13 +65,14 @@ def soak(
     """Run the whole graph in real time for long; print what grows, slows down, or is lost."""
     from rich import box
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
+    from ja_common.core.run_folder import new_run_folder
     from ja_common.ros_arguments import parameter_arguments
     from ja_diagnostics.soak import COLUMNS, Soak
     from ja_runner.graph import sim_graph, with_arguments
     from ja_runner.parts import check_installed
-    from ja_runner.run import new_run_folder
 
     check_installed(['ja_sim'])
     folder = new_run_folder('soak').absolute()
@@ -83,7 +85,7 @@ def soak(
     arguments = [*parameter_arguments(settings), *(context.obj or [])]
     run = Soak(with_arguments(sim_graph(), arguments), folder, typer.echo)
     code = run.run(time_s)
-    table = Table(*COLUMNS, box=box.MARKDOWN)
+    table = Table(*map(escape, COLUMNS), box=box.MARKDOWN)
     for series in run.series():
         table.add_row(*series.row())
     Console(width=130, soft_wrap=True).print(table)

@@ -18,7 +18,9 @@ _FACE: Colour = (255, 220, 60)
 _FEATURE_COLOURS: tuple[Colour, ...] = ((255, 80, 80), (80, 200, 255), (140, 255, 100))
 _BAR_GROUND: Colour = (60, 60, 60)
 _BAR_PX = 40
-_LEAST_WIDTH = 480
+_LEAST_SIDE = 480
+# OpenCV cannot draw at pixels much farther out; detections of other nodes may stand anywhere.
+_FARTHEST_PX = 30_000.0
 _GOLDEN_RATIO = 0.618033988749895
 
 
@@ -31,9 +33,9 @@ def annotate_image(
     latency_s: float,
 ) -> NDArray[np.uint8]:
     """Return a copy of an (H, W, 3) RGB image, enlarged if small, with all detections drawn in."""
-    enlarge = max(1, math.ceil(_LEAST_WIDTH / image.shape[1]))
+    enlarge = max(1, math.ceil(_LEAST_SIDE / max(image.shape[:2])))
     canvas = cv2.resize(image, None, fx=enlarge, fy=enlarge, interpolation=cv2.INTER_LINEAR)
-    radius = round(enlarge * camera.fx * math.tan(d_th_rad))
+    radius = round(min(enlarge * camera.fx * math.tan(d_th_rad), _FARTHEST_PX))
     cv2.circle(canvas, _at((camera.cx, camera.cy), enlarge), radius, _WHITE, 1, cv2.LINE_AA)
     target = most_salient(list(detections))
     for detection in detections:
@@ -65,16 +67,17 @@ def _feature_bars(
     for row, (value, colour) in enumerate(zip(features, _FEATURE_COLOURS, strict=True)):
         top = corner[1] + 4 * row
         for length, shade in ((1.0, _BAR_GROUND), (value, colour)):
-            end = corner[0] + round(_BAR_PX * length)
+            end = corner[0] + round(_BAR_PX * min(max(length, 0.0), 1.0))
             cv2.rectangle(canvas, (corner[0], top), (end, top + 2), shade, cv2.FILLED)
 
 
 def _inset(canvas: NDArray[np.uint8], face_image: NDArray[np.uint8]) -> None:
-    """Draw the face image, enlarged, into the upper right corner."""
+    """Draw the face image, enlarged, into the upper right corner; what does not fit is cut off."""
     scale = max(1, canvas.shape[0] // 4 // face_image.shape[0])
-    enlarged = cv2.resize(face_image, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
-    height, width = enlarged.shape
-    canvas[:height, -width:] = enlarged[..., None]
+    shown = face_image[: canvas.shape[0], : canvas.shape[1]]
+    enlarged = cv2.resize(shown, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
+    height, width = (min(pair) for pair in zip(enlarged.shape, canvas.shape, strict=False))
+    canvas[:height, -width:] = enlarged[:height, :width, None]
 
 
 def _text(canvas: NDArray[np.uint8], text: str, place: tuple[int, int], colour: Colour) -> None:
@@ -86,7 +89,8 @@ def _text(canvas: NDArray[np.uint8], text: str, place: tuple[int, int], colour: 
 
 
 def _at(pixel: tuple[float, float], enlarge: int) -> tuple[int, int]:
-    return round((pixel[0] + 0.5) * enlarge - 0.5), round((pixel[1] + 0.5) * enlarge - 0.5)
+    column, row = (min(max((x + 0.5) * enlarge - 0.5, -_FARTHEST_PX), _FARTHEST_PX) for x in pixel)
+    return round(column), round(row)
 
 
 def _colour_of(track_id: int) -> Colour:

@@ -8,6 +8,8 @@ import math
 from dataclasses import MISSING, Field, field, fields
 from typing import Any
 
+_SHOWN = 200
+
 
 class ConfigError(ValueError):
     """A configuration value that cannot be used; the message names field, reason and range."""
@@ -62,32 +64,42 @@ def checked(config_field: Field, value: Any) -> Any:
     value = _converted(name, type(default), value)
     low, high = config_field.metadata.get('low'), config_field.metadata.get('high')
     if (low is not None and value < low) or (high is not None and value > high):
-        raise ConfigError(f'{name} = {value!r} is outside {_range_text(low, high)}')
+        raise ConfigError(f'{name} = {_shown(value)} is outside {_range_text(low, high)}')
     choices = config_field.metadata.get('choices')
     if choices and value not in choices:
-        raise ConfigError(f'{name} = {value!r} is not one of {", ".join(choices)}')
+        raise ConfigError(f'{name} = {_shown(value)} is not one of {", ".join(choices)}')
     return value
 
 
 def _checked_interval(name: str, value: Any, low: float, high: float) -> tuple[float, float]:
     pair = isinstance(value, tuple) and len(value) == 2
     if not pair or any(type(bound) not in (int, float) for bound in value):
-        raise ConfigError(f'{name} = {value!r} is not a pair [low, high] of numbers')
+        raise ConfigError(f'{name} = {_shown(value)} is not a pair [low, high] of numbers')
     if not low <= value[0] <= value[1] <= high:
-        raise ConfigError(f'{name} = {list(value)} is not a rising pair in [{low}, {high}]')
+        shown = _shown(list(value))
+        raise ConfigError(f'{name} = {shown} is not a rising pair in [{low}, {high}]')
     return value
 
 
 def _converted(name: str, wanted: type, value: Any) -> Any:
     if wanted is float and (type(value) is int or isinstance(value, float)):
-        value = float(value)  # a whole number, or a scalar of numpy
+        try:
+            value = float(value)  # a whole number, or a scalar of numpy
+        except OverflowError:
+            raise ConfigError(f'{name} = {_shown(value)} is too large for a float') from None
     if type(value) is not wanted:
         raise ConfigError(
-            f'{name} = {value!r} is {_named(type(value))}; {_named(wanted)} is needed'
+            f'{name} = {_shown(value)} is {_named(type(value))}; {_named(wanted)} is needed'
         )
     if isinstance(value, float) and not math.isfinite(value):
         raise ConfigError(f'{name} = {value!r} is not a finite number')
     return value
+
+
+def _shown(value: Any) -> str:
+    """Return the value as Python writes it; a long one is cut, since it may come from a file."""
+    text = repr(value)
+    return text if len(text) <= _SHOWN else f'{text[:_SHOWN]}...'
 
 
 def _named(kind: type) -> str:

@@ -1,5 +1,6 @@
 """The health of a node: which inputs are silent, and which problems occurred. No ROS."""
 
+import math
 from dataclasses import dataclass, field
 from enum import IntEnum
 
@@ -16,6 +17,12 @@ class Level(IntEnum):
 FIRST_MESSAGE_TIMES = 3.0
 """Before its first message an input may be silent so many times as long: nodes are starting."""
 
+START_S = 30.0
+"""So long an input without a first message is in the report only: the log of a start is short."""
+
+ANOTHER_MESSAGE_EVERY_S = 60.0
+"""Where one place has always another problem to report, one of them is news so often [s]."""
+
 
 @dataclass
 class _Input:
@@ -23,6 +30,16 @@ class _Input:
     received: int = 0
     received_at_s: float | None = None
     recent: int = 0
+
+
+@dataclass
+class _Problem:
+    level: Level
+    message: str
+    recorded_at_s: float
+    logged_level: int = -1
+    logged_message: str = ''
+    logged_at_s: float = -math.inf
 
 
 @dataclass
@@ -44,7 +61,7 @@ class Health:
         self._started_s = now_s
         self._error_memory_s = error_memory_s
         self._inputs: dict[str, _Input] = {}
-        self._problems: dict[str, tuple[Level, str, float]] = {}
+        self._problems: dict[str, _Problem] = {}
         self._reported_s = now_s
         self.values: dict[str, str] = {}
 
@@ -60,13 +77,30 @@ class Health:
         entry.received_at_s = now_s
 
     def record_problem(
-        self, where: str, message: str, now_s: float, level: Level = Level.ERROR
+        self,
+        where: str,
+        message: str,
+        now_s: float,
+        level: Level = Level.ERROR,
+        quiet: bool = False,
     ) -> bool:
-        """Record a problem; return True when it is news (so that the log is not flooded)."""
+        """Record a problem; return True when it is news (so that the log is not flooded).
+
+        A problem lasts while `where` (a topic, a timer, a part of the node) has one again within
+        `error_memory_s`. It is news once, and again when it becomes worse, or when it has another
+        message than a minute ago; the messages alone may differ each time, as those with figures
+        do. A `quiet` problem is never news.
+        """
         known = self._problems.get(where)
-        news = known is None or known[1] != message or now_s - known[2] > self._error_memory_s
-        self._problems[where] = (level, message, now_s)
-        return news
+        if known is None or now_s - known.recorded_at_s > self._error_memory_s:
+            known = self._problems[where] = _Problem(level, message, now_s)
+        known.level, known.message, known.recorded_at_s = level, message, now_s
+        changed = message != known.logged_message
+        waited = now_s - known.logged_at_s >= ANOTHER_MESSAGE_EVERY_S
+        if quiet or not (level > known.logged_level or (changed and waited)):
+            return False
+        known.logged_level, known.logged_message, known.logged_at_s = level, message, now_s
+        return True
 
     def clear_problem(self, where: str) -> None:
         """Remove a problem that is over."""
@@ -85,6 +119,10 @@ class Health:
                 silence[name] = allowed_s
         return silence
 
+    def is_starting(self, name: str, now_s: float) -> bool:
+        """Return whether an input may be without a first message because nodes still start."""
+        return self._inputs[name].received == 0 and now_s - self._started_s < START_S
+
     def report(self, now_s: float) -> Report:
         """Return everything in one report; rates are those since the last report."""
         seconds = max(now_s - self._reported_s, 1e-9)
@@ -97,8 +135,9 @@ class Health:
         self._problems = {
             where: problem
             for where, problem in self._problems.items()
-            if now_s - problem[2] <= self._error_memory_s
+            if now_s - problem.recorded_at_s <= self._error_memory_s
         }
-        found = [(level, message) for level, message, _ in self._problems.values()]
-        worst = max((level for level, _ in found), default=Level.OK)
-        return Report(worst, '; '.join(text for _, text in found) or 'OK', values)
+        found = self._problems.values()
+        worst = max((problem.level for problem in found), default=Level.OK)
+        text = '; '.join(problem.message for problem in found)
+        return Report(worst, text or 'OK', values)

@@ -195,7 +195,8 @@ class AttentionCycle:
             return
         self._source = Source.FACE
         self._caregiver = percept.posture.position + face
-        if math.hypot(*face) > self.config.look_tolerance_rad or not self._is_still(percept):
+        centred = math.hypot(*face) <= self.config.look_tolerance_rad
+        if not (centred and self._is_still(percept)):
             self._target = self._caregiver
             self._since_ns = None
             return

@@ -1,28 +1,27 @@
 """The guard of the commands: every command is safe, and missing input holds the head.
 
-The checks, in this order: a target must be finite; the inputs must be fresh; a target within the
-dead zone of the last one is ignored; the motion profile limits speed and acceleration, relative
-to the *previous command*; targets keep a soft margin to the position limits, which only braking
-may use. After every hold the command restarts at the measured posture, at rest.
+The checks, in this order: no other node may command the head; a target must be finite; the inputs
+must be fresh; a target within the dead zone of the last one is ignored; the motion profile limits
+speed and acceleration, relative to the *previous command*; targets keep a soft margin to the
+position limits, which only braking may use. After every hold the command restarts at the measured
+posture, at rest.
 
 Time is any clock that only runs forward, in seconds; if it runs back, all inputs are discarded.
+Comparisons are written so that NaN fails them: what cannot be compared is neither fresh nor near.
 """
 
 import math
 from dataclasses import dataclass, replace
-from enum import Enum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ja_common.core.config import Configuration, parameter
 from ja_common.core.geometry import finite_pair
-from ja_common.core.health import Level
+from ja_control.core.hold import Cause, Hold
 from ja_control.core.joint_limits import JointLimits, JointLimitsConfig
 from ja_control.core.motion_profile import MotionProfile
-
-_PROGRESS_RAD = 0.02
-"""A joint that has come this much nearer to its command moves; it is not stalled."""
+from ja_control.core.stall_watch import StallWatch
 
 
 @dataclass(frozen=True)
@@ -61,37 +60,12 @@ class CommandGuardConfig(Configuration):
     )
 
 
-class Cause(Enum):
-    """Why the head is held."""
-
-    DISABLED = 'disabled'
-    BLOCKED = 'blocked'
-    WAITING = 'waiting'
-    SILENT = 'silent'
-    STALE_IMAGE = 'stale image'
-    STALE_JOINTS = 'stale joint states'
-    OUTSIDE = 'outside the limits'
-    STALLED = 'stalled'
-
-
-@dataclass(frozen=True)
-class Hold:
-    """Why the head is held, in one sentence."""
-
-    cause: Cause
-    text: str
-
-    @property
-    def level(self) -> Level:
-        """Return ERROR where a person must act, else WARN."""
-        return Level.ERROR if self.cause in (Cause.OUTSIDE, Cause.STALLED) else Level.WARN
-
-
 @dataclass(frozen=True)
 class Command:
     """What to send: position (2,) [rad] and velocity (2,) [rad/s] of (pan, tilt).
 
-    `position` is None while nothing may be sent: until the head moves for the first time.
+    `position` is None while nothing may be sent: until the head moves for the first time, and at
+    rest while another node commands it.
     `clamped` names the limits that cut the motion ('' for none), `hold` why the head is held.
     """
 
@@ -104,7 +78,8 @@ class Command:
 class CommandGuard:
     """Turns targets into safe commands: call `step` once a control period.
 
-    `blocked`: a reason of the caller to hold the head; '' for none.
+    The caller may hold the head: `other_commander` names the nodes that command it as well, and
+    `blocked` is any other reason; '' for none. Raises ValueError for a period that is no time.
     """
 
     def __init__(
@@ -114,8 +89,11 @@ class CommandGuard:
         period_s: float,
         enabled: bool = True,
     ) -> None:
+        if not 0.0 < period_s < math.inf:
+            raise ValueError(f'the control period must be a time > 0, got {period_s} s')
         self.limits = JointLimits(limits)
         self.config = config
+        self.other_commander = ''
         self.blocked = ''
         self._limits_config = limits
         self._new_limits: JointLimitsConfig | None = None
@@ -124,9 +102,8 @@ class CommandGuard:
         self._latched: Hold | None = None
         self._joints: list[MotionProfile] | None = None
         self._target = np.zeros(2)
-        self._follow_since_s = np.zeros(2)
+        self._stall_watch = StallWatch()
         self._measured: NDArray[np.float64] | None = None
-        self._follow_from: NDArray[np.float64] | None = None
         self._now_s = -math.inf
         self._discard_inputs()
 
@@ -201,15 +178,14 @@ class CommandGuard:
         )
 
     def _advance_clock(self, now_s: float) -> None:
-        if now_s < self._now_s:
+        if not self._now_s <= now_s < math.inf:
             self._discard_inputs()
-        self._now_s = now_s
+        self._now_s = now_s if math.isfinite(now_s) else -math.inf
 
     def _discard_inputs(self) -> None:
         self._measured = None
         self._measured_s = self._image_s = self._complete_s = -math.inf
         self._stalled_until_s = -math.inf
-        self._follow_from = None
         self._engaged = False
 
     def _advance(self, hold: Hold | None, cut: set[str]) -> None:
@@ -217,6 +193,9 @@ class CommandGuard:
         at_rest = self._joints is None or not any(joint.velocity for joint in self._joints)
         if at_rest and self._new_limits is not None:
             self._apply_new_limits()
+        if at_rest and hold is not None and hold.cause is Cause.OTHER_COMMANDER:
+            # To repeat the posture would pull the head back from where the other turns it.
+            self._joints = None
         if at_rest and hold is None and not self._engaged:
             self._start()
         if self._joints is None:
@@ -234,7 +213,7 @@ class CommandGuard:
         assert self._measured is not None, 'the guard holds until joint states come'
         self._joints = self._profiles(self._measured)
         self._target = self._measured
-        self._follow_from = None
+        self._stall_watch.restart()
         self._engaged = True
 
     def _apply_new_limits(self) -> None:
@@ -263,6 +242,8 @@ class CommandGuard:
 
     def _find_hold(self) -> Hold | None:
         c, now_s = self.config, self._now_s
+        if self.other_commander:
+            return Hold(Cause.OTHER_COMMANDER, self.other_commander)
         if not self._enabled:
             return Hold(Cause.DISABLED, 'disabled')
         if self._latched is not None:
@@ -278,37 +259,29 @@ class CommandGuard:
             (Cause.STALE_IMAGE, self._image_s, 'image'),
             (Cause.STALE_JOINTS, self._measured_s, 'joint state'),
         ):
-            if now_s - stamp_s > c.stale_after_s:
-                return Hold(cause, f'the newest {what} is older than {c.stale_after_s:g} s')
-            if stamp_s - now_s > c.stale_after_s:
+            age_s = now_s - stamp_s
+            if age_s < -c.stale_after_s:
                 return Hold(cause, f'the newest {what} is stamped ahead of the clock')
-        if now_s - self._complete_s > c.hold_after_s:
+            if not age_s <= c.stale_after_s:
+                return Hold(cause, f'the newest {what} is older than {c.stale_after_s:g} s')
+        if not now_s - self._complete_s <= c.hold_after_s:
             return Hold(Cause.SILENT, f'no complete image for {c.hold_after_s:g} s')
         if now_s < self._stalled_until_s or self._is_stalled():
             text = f'a joint does not follow its command within {c.stall_error_rad:g} rad'
             return Hold(Cause.STALLED, text)
-        if not self._engaged and self.limits.excess_rad(self._measured) > c.outside_rad:
+        if not (self._engaged or self.limits.excess_rad(self._measured) <= c.outside_rad):
             text = f'the head stands more than {c.outside_rad:g} rad outside its limits'
             return Hold(Cause.OUTSIDE, f'{text}: {self._measured[0]:.3g}, {self._measured[1]:.3g}')
         return None
 
     def _is_stalled(self) -> bool:
-        """Whether a joint far from its command has come no nearer for `stall_after_s`.
-
-        Uses the times of the measurements: a joint without new measurements is stale, not stalled.
-        """
         if not self._engaged or self._joints is None or self._measured is None:
             return False
-        gap = np.array([joint.position for joint in self._joints]) - self._measured
-        far = np.abs(gap) > self.config.stall_error_rad
-        if self._follow_from is None:
-            self._follow_from = self._measured.copy()
-            self._follow_since_s = np.full(2, self._measured_s)
-        progress = np.sign(gap) * (self._measured - self._follow_from)
-        moving = ~far | (progress > _PROGRESS_RAD)
-        self._follow_from[moving] = self._measured[moving]
-        self._follow_since_s[moving] = self._measured_s
-        if np.all(self._measured_s - self._follow_since_s <= self.config.stall_after_s):
+        command = np.array([joint.position for joint in self._joints])
+        c = self.config
+        if not self._stall_watch.is_stalled(
+            command, self._measured, self._measured_s, c.stall_error_rad, c.stall_after_s
+        ):
             return False
-        self._stalled_until_s = self._now_s + self.config.retry_after_s
+        self._stalled_until_s = self._now_s + c.retry_after_s
         return True

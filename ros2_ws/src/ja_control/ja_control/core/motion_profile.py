@@ -13,9 +13,9 @@ def stopping_speed(distance: float, speed_step: float, period_s: float) -> float
 
     Speeds fall by at most `speed_step` (= A h) a period. With the speed m = n + f in units of A h
     (n whole, 0 <= f < 1) the distance to a stop is A h^2 (n (n + 1) / 2 + f (n + 1)); this is its
-    inverse.
+    inverse. A distance that is not finite has no stopping speed but 0.
     """
-    if distance <= 0.0:
+    if not 0.0 < distance < math.inf:
         return 0.0
     scaled = distance / (speed_step * period_s)
     n = math.floor((math.sqrt(8.0 * scaled + 1.0) - 1.0) / 2.0)

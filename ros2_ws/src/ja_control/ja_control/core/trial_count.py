@@ -1,11 +1,12 @@
 """The count of finished trials, on which p(LM) depends, in a file."""
 
-import os
 from pathlib import Path
+
+from ja_common.core.files import write_file
 
 
 def load_trials(path: Path) -> int:
-    """Return the count in a file; 0 without a file. Raises ValueError when it holds no count."""
+    """Return the count in a file; 0 without a file. Raises ValueError when it has none to read."""
     try:
         text = path.read_text(encoding='ascii')
         return int(text) if text.strip().isdecimal() else _refuse(path)
@@ -13,14 +14,13 @@ def load_trials(path: Path) -> int:
         return 0
     except UnicodeDecodeError:
         return _refuse(path)
+    except OSError as error:
+        raise ValueError(f'{path} cannot be read ({error.strerror}): name another file') from None
 
 
 def save_trials(path: Path, trials: int) -> None:
-    """Write the count atomically: the file is always the old or the new one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f'.{path.name}.{os.getpid()}')
-    temporary.write_text(f'{trials}\n', encoding='ascii')
-    os.replace(temporary, path)
+    """Write the count: the file is always the old or the new one. Raises SaveError."""
+    write_file(path, f'{trials}\n')
 
 
 def _refuse(path: Path) -> int:

@@ -14,6 +14,17 @@ from ja_control.core.joint_limits import JointLimitsConfig
 _AXIS_TOLERANCE = math.cos(math.radians(15.0))
 
 
+LARGEST_URDF = 2**24
+"""Characters of a robot description that is read; those with meshes have some thousand."""
+
+
+class _WithoutDoctype(ElementTree.TreeBuilder):
+    """A builder that refuses a document type: its entities can expand to more than the memory."""
+
+    def doctype(self, name: str, _pubid: str | None, _system: str | None) -> None:
+        raise ValueError(f'the robot description has a DOCTYPE ({name[:50]}): remove it')
+
+
 @dataclass(frozen=True)
 class UrdfJoint:
     """One joint: limits [rad, rad/s] as the rig counts, and its axis (3,) in the root's frame.
@@ -32,8 +43,10 @@ def read_joint(urdf: str, name: str) -> UrdfJoint:
 
     Raises ValueError with what is missing or wrong.
     """
+    if len(urdf) > LARGEST_URDF:
+        raise ValueError(f'the robot description is longer than {LARGEST_URDF} characters')
     try:
-        robot = ElementTree.fromstring(urdf)
+        robot = ElementTree.fromstring(urdf, ElementTree.XMLParser(target=_WithoutDoctype()))
     except ElementTree.ParseError as error:
         raise ValueError(f'the robot description is no XML: {error}') from None
     joints = {joint.get('name', ''): joint for joint in robot.findall('joint')}
@@ -69,7 +82,7 @@ def narrow_limits(
         ('tilt', tilt, signs[1], offsets[1], (0.0, 1.0, 0.0)),
     ):
         along = float(sign * joint.axis @ np.array(rep_103))
-        if along < _AXIS_TOLERANCE:
+        if not along >= _AXIS_TOLERANCE:
             opposite = along < -_AXIS_TOLERANCE
             remedy = f'change {what}_inverted on every node' if opposite else f'not {rep_103}'
             raise ValueError(
@@ -79,14 +92,16 @@ def narrow_limits(
         ends = sorted((sign * (joint.low - offset), sign * (joint.high - offset)))
         ranges.append(ends)
     (pan_low, pan_high), (tilt_low, tilt_high) = ranges
+    speeds = (limits.max_speed_rad_s, pan.max_speed, tilt.max_speed)
     try:
         return replace(
             limits,
-            pan_min_rad=max(limits.pan_min_rad, pan_low),
-            pan_max_rad=min(limits.pan_max_rad, pan_high),
-            tilt_min_rad=max(limits.tilt_min_rad, tilt_low),
-            tilt_max_rad=min(limits.tilt_max_rad, tilt_high),
-            max_speed_rad_s=min(limits.max_speed_rad_s, pan.max_speed, tilt.max_speed),
+            # Not Python's max and min, for which NaN would be no limit.
+            pan_min_rad=float(np.maximum(limits.pan_min_rad, pan_low)),
+            pan_max_rad=float(np.minimum(limits.pan_max_rad, pan_high)),
+            tilt_min_rad=float(np.maximum(limits.tilt_min_rad, tilt_low)),
+            tilt_max_rad=float(np.minimum(limits.tilt_max_rad, tilt_high)),
+            max_speed_rad_s=float(np.min(speeds)),
         )
     except ConfigError as error:
         raise ValueError(f'limits of the URDF and of the parameters: {error}') from None

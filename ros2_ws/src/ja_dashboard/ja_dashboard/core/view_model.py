@@ -3,7 +3,7 @@
 import math
 from collections import Counter, deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
@@ -18,6 +18,13 @@ STOPPED_AFTER_S = 2.0
 """The graph counts as stopped after this time without a new image [s]."""
 _SILENT_AFTER_S = 3.0  # every node reports its health at 1 Hz
 _LOG_LINES = 200
+# What foreign nodes publish must not fill the memory, nor the page, which is sent four times a
+# second.
+_MOST_NODES = 100
+_MOST_VALUES = 40
+_LONGEST_TEXT = 300
+_LONGEST_LINE = 4000
+_SOURCES = ('face', 'glance', 'VF', 'LM')
 _CURVE_POINTS = 200
 _ACTIVITIES = {
     ('look', ''): 'turning back to where the caregiver was',
@@ -162,25 +169,35 @@ class ViewModel:
     def record_gate_status(self, values: Mapping[str, str]) -> None:
         """Record the values of the gate's status; a trial ends when the phase of shifts does."""
         if self.gate.get('phase') == 'shift' and values.get('phase') != 'shift':
-            self.fixations[self.gate.get('source', 'none') if self._fixated else 'none'] += 1
+            source = self.gate.get('source') if self._fixated else 'none'
+            self.fixations[source if source in _SOURCES else 'none'] += 1
             self._fixated = False
         # Only a status with a decision has a source; it stays until the next one.
-        self.gate = {**{key: self.gate.get(key, '-') for key in ('source', 'p_lm')}, **values}
+        decision = {key: self.gate.get(key, '-') for key in ('source', 'p_lm')}
+        self.gate = {**decision, **_shortened(values)}
 
     def record_trial(self, success: bool, now_s: float) -> None:
         """Record the score of a trial."""
-        p_lm = self.gate.get('p_lm', '-')
-        known = float('nan') if p_lm == '-' else float(p_lm)
-        self.curve.record_trial(success, known, now_s - self._start_s)
+        try:
+            p_lm = float(self.gate.get('p_lm', '-'))
+        except ValueError:
+            p_lm = math.nan  # no decision yet
+        self.curve.record_trial(success, p_lm, now_s - self._start_s)
 
     def record_health(self, health: NodeHealth) -> None:
-        """Record the health of a node."""
-        self._node_health[health.node] = health
+        """Record the health of a node; of too many nodes, the longest silent one is left out."""
+        node = _short(health.node)
+        self._node_health.pop(node, None)
+        self._node_health[node] = replace(
+            health, node=node, message=_short(health.message), values=_shortened(health.values)
+        )
+        if len(self._node_health) > _MOST_NODES:
+            del self._node_health[next(iter(self._node_health))]
 
     def append_log(self, line: str) -> None:
         """Append a line of a node's log, or the answer to a button."""
         self.log_lines += 1
-        self.log.append((self.log_lines, line))
+        self.log.append((self.log_lines, _short(line, _LONGEST_LINE)))
 
     def node_health(self, now_s: float) -> list[NodeHealth]:
         """Return the health of all nodes so far, in the order of their names."""
@@ -237,6 +254,15 @@ class ViewModel:
 
     def _health_value(self, key: str) -> str:
         return next((h.values[key] for h in self._node_health.values() if key in h.values), '')
+
+
+def _short(text: str, longest: int = _LONGEST_TEXT) -> str:
+    return text if len(text) <= longest else f'{text[:longest]}...'
+
+
+def _shortened(values: Mapping[str, str]) -> dict[str, str]:
+    chosen = list(values.items())[:_MOST_VALUES]
+    return {_short(key): _short(value) for key, value in chosen}
 
 
 def _wilson(

@@ -1,6 +1,7 @@
 """All faults: how each begins and ends, how long it lasts, and whether the head has to stop."""
 
 import os
+import resource
 import signal
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,6 +12,9 @@ from ja_diagnostics.faults.disturbance import Disturbance
 from ja_diagnostics.faults.relay import Relay
 
 LASTS_S = 5.0
+HUNG_AFTER_S = 8.0
+"""A node without a heartbeat for so long is replaced: longer than any other fault lasts."""
+
 _CAMERA = (IMAGE, CAMERA_INFO)
 _JOINTS = (JOINT_STATES,)
 _silence = partial(Disturbance, silent=True)
@@ -33,26 +37,36 @@ class Graph:
 Action = Callable[[Graph], None]
 
 
+def _at_its_time(_: Graph) -> bool:
+    return False
+
+
 @dataclass(frozen=True)
 class Fault:
-    """A fault. `stops`: does the head have to stop? If not, it has to go on."""
+    """A fault. `stops`: does the head have to stop? If not, it has to go on.
+
+    It ends after `lasts_s`, or earlier when it is `over`.
+    """
 
     name: str
     begin: Action
     end: Action
     lasts_s: float = LASTS_S
     stops: bool = True
+    over: Callable[[Graph], bool] = _at_its_time
 
 
 def faults(nodes: list[str]) -> list[Fault]:
     """Return all faults of a graph with these nodes, each in its own process."""
     return [
-        *(fault for node in nodes for fault in (_killed(node), _frozen(node))),
+        *(fault for node in nodes for fault in (_killed(node), _frozen(node), _hung(node))),
         _disturbed('camera stopped', _CAMERA, _silence),
         _disturbed('joint states stopped', _JOINTS, _silence),
         _disturbed('joint states delayed by 0.1 s', _JOINTS, _delay, stops=False),
         _disturbed('joint states out of order', _JOINTS, _disorder, stops=False),
         _clock_set_back(),
+        _disk_full(),
+        _two_commanders(),
     ]
 
 
@@ -68,6 +82,44 @@ def _frozen(node: str) -> Fault:
         f'{node} frozen',
         lambda graph: graph.send_signal(node, signal.SIGSTOP),
         lambda graph: graph.send_signal(node, signal.SIGCONT),
+    )
+
+
+def _hung(node: str) -> Fault:
+    """Freeze a node for ever: the supervisor has to notice, and to replace it."""
+    frozen: list[int] = []
+
+    def begin(graph: Graph) -> None:
+        frozen.append(graph.pids()[node])
+        graph.send_signal(node, signal.SIGSTOP)
+
+    def is_replaced(graph: Graph) -> bool:
+        return graph.pids()[node] != frozen[0]
+
+    longest_s = 3 * HUNG_AFTER_S
+    return Fault(f'{node} hung, replaced', begin, _nothing, longest_s, over=is_replaced)
+
+
+def _disk_full() -> Fault:
+    """Let no node write to a file: as on a full disk, only that the error has another name."""
+
+    def limit_writing(size: int, graph: Graph) -> None:
+        for pid in graph.pids().values():
+            resource.prlimit(pid, resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+
+    return Fault(
+        'disk full',
+        partial(limit_writing, 0),
+        partial(limit_writing, resource.RLIM_INFINITY),
+        stops=False,
+    )
+
+
+def _two_commanders() -> Fault:
+    return Fault(
+        'two commanders of the head',
+        lambda graph: graph.relay.start_commanding(),
+        lambda graph: graph.relay.stop_commanding(),
     )
 
 

@@ -10,13 +10,16 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from ja_common.python_command import code_command, module_command
 from ja_common.ros_defaults import apply_ros_defaults
-from ja_diagnostics.faults.catalogue import Fault
+from ja_diagnostics.faults import intruder
+from ja_diagnostics.faults.catalogue import Fault, Graph
 from ja_diagnostics.faults.run import FaultOutcome, FaultRun
 from ja_runner.node_spec import NodeSpec
 
@@ -24,6 +27,8 @@ _RESULT = 'outcome.json'
 _NEAR, _FAR = '10.77.0.1/24', '10.77.0.2/24'
 _FULL_BYTES = 40 * 2**20
 _SEGMENT_BYTES = 8 * 2**20
+_INTRUDER_S = 5.0
+_PLUG_PATIENCE_S = 10.0
 # A participant that kills itself, and leaves its segment behind.
 _DIES = 'import os, rclpy; rclpy.init(); node = rclpy.create_node("dies"); os.kill(os.getpid(), 9)'
 
@@ -72,7 +77,7 @@ def run_on_hosts(case: str, folder: Path, report: Callable[[str], None]) -> Faul
 
 def host_command(case: str, folder: Path) -> list[str]:
     """Return the command line that runs a case in namespaces of its own."""
-    command = [sys.executable, '-m', 'ja_diagnostics.faults.hosts', case, str(folder)]
+    command = module_command('ja_diagnostics.faults.hosts', case, str(folder))
     return ['unshare', '--net', '--mount', *command]
 
 
@@ -96,9 +101,9 @@ def place_on_host(graph: Sequence[NodeSpec], executable: str, host: int) -> list
 
 
 def _network_cut(folder: Path) -> FaultOutcome:
-    with _far_host() as host:
+    with far_host() as host:
         # This is safe: no link leads out of these two hosts.
-        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'SUBNET'
+        _set_discovery_range('SUBNET')
 
         def place(graph: list[NodeSpec]) -> list[NodeSpec]:
             return place_on_host(graph, 'learning_module', host)
@@ -112,16 +117,58 @@ def _network_cut(folder: Path) -> FaultOutcome:
         return _run_fault(run, cut)
 
 
+def _intruder(folder: Path) -> FaultOutcome:
+    with far_host() as host:
+        _set_discovery_range('LOCALHOST')
+        tries: list[subprocess.Popen[str]] = []
+
+        def end(_: Graph) -> None:
+            found, _error = tries[0].communicate()
+            _report(f'the other host found: {found.strip()}')
+
+        fault = Fault(
+            'another host calls enable(false)',
+            lambda _: tries.append(start_intruder(host)),
+            end,
+            _INTRUDER_S,
+            stops=False,
+        )
+        return _run_fault(FaultRun(folder, _report), fault)
+
+
 def _full_of_dead_segments(folder: Path) -> FaultOutcome:
     subprocess.run(['mount', '-o', f'remount,size={_FULL_BYTES}', '/dev/shm'], check=True)
     while shutil.disk_usage('/dev/shm').free > _SEGMENT_BYTES:
-        subprocess.run([sys.executable, '-c', _DIES], check=False)
+        subprocess.run(code_command(_DIES), check=False)
     run = FaultRun(folder, _report)
     (killed,) = [f for f in run.faults() if f.name == 'salient_feature_detector killed -9']
     return _run_fault(run, replace(killed, name=f'{killed.name}, /dev/shm full of dead segments'))
 
 
-CASES = {'network': _network_cut, 'segments': _full_of_dead_segments}
+CASES = {'network': _network_cut, 'intruder': _intruder, 'segments': _full_of_dead_segments}
+
+
+def start_intruder(host: int, for_s: float = _INTRUDER_S) -> subprocess.Popen[str]:
+    """Start a program on the far host that names the near one and calls its `enable` (false).
+
+    It prints one line of JSON after `for_s` [s], with the keys of `intruder.try_to_enter`.
+    """
+    environ = {
+        **os.environ,
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET',
+        'ROS_STATIC_PEERS': _NEAR.partition('/')[0],
+    }
+    program = module_command(intruder.__name__, str(for_s))
+    command = ['nsenter', f'--target={host}', '--net', '--mount', '--', *program]
+    return subprocess.Popen(command, env=environ, stdout=subprocess.PIPE, text=True)
+
+
+def _set_discovery_range(name: str) -> None:
+    """Set the range of this process and its children, whatever the caller has set."""
+    for other in ('ROS_LOCALHOST_ONLY', 'ROS_STATIC_PEERS'):
+        os.environ.pop(other, None)
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = name
+    apply_ros_defaults()
 
 
 def _run_fault(run: FaultRun, fault: Fault) -> FaultOutcome:
@@ -130,7 +177,7 @@ def _run_fault(run: FaultRun, fault: Fault) -> FaultOutcome:
 
 
 @contextmanager
-def _far_host() -> Iterator[int]:
+def far_host() -> Iterator[int]:
     """Make a second host at the end of a virtual cable; yield the process id of its namespaces."""
     # It waits for the end of its input, so that it ends with this process.
     script = 'mount -t tmpfs tmpfs /dev/shm && ip link set lo up && echo ready && cat'
@@ -144,12 +191,27 @@ def _far_host() -> Iterator[int]:
         _ip(f'link add near type veth peer name far netns {far.pid}')
         _ip(f'address add {_NEAR} dev near')
         _ip('link set near up')
-        far_ip = ['nsenter', f'--target={far.pid}', '--net', 'ip']
+        enter = ['nsenter', f'--target={far.pid}', '--net']
         for order in (f'address add {_FAR} dev far', 'link set far up'):
-            subprocess.run([*far_ip, *order.split()], check=True)
+            subprocess.run([*enter, 'ip', *order.split()], check=True)
+        # Fast DDS looks once for interfaces, and takes only those whose cable is plugged in.
+        _wait_until_plugged_in('near')
+        _wait_until_plugged_in('far', enter)
         yield far.pid
     finally:
         far.communicate()
+
+
+def _wait_until_plugged_in(device: str, enter: Sequence[str] = ()) -> None:
+    command = [*enter, 'ip', '-oneline', 'link', 'show', device]
+    end_s = time.monotonic() + _PLUG_PATIENCE_S
+    while (
+        ' state UP '
+        not in subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    ):
+        if time.monotonic() > end_s:
+            raise OSError(f'the virtual network device {device} did not come up')
+        time.sleep(0.02)
 
 
 def _ip(order: str) -> None:
@@ -160,11 +222,16 @@ def _report(line: str) -> None:
     print(line, flush=True)
 
 
-def main() -> None:
-    """Run a case inside the near host, whose namespaces exist already and are empty."""
-    case, folder = sys.argv[1], Path(sys.argv[2])
+def prepare_host() -> None:
+    """Give the near host, whose namespaces exist already and are empty, what every host has."""
     subprocess.run(['mount', '-t', 'tmpfs', 'tmpfs', '/dev/shm'], check=True)
     _ip('link set lo up')
+
+
+def main() -> None:
+    """Run a case inside the near host."""
+    case, folder = sys.argv[1], Path(sys.argv[2])
+    prepare_host()
     apply_ros_defaults()
     outcome = CASES[case](folder)
     write_outcome(outcome, folder)

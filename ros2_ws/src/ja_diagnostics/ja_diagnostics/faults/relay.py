@@ -11,7 +11,7 @@ from rclpy.publisher import Publisher
 from ja_common.core.stamps import NS_PER_S
 from ja_common.graph_node import GraphNode
 from ja_common.time_codec import to_ns, to_time
-from ja_common.topics import CAMERA_INFO, CLOCK, IMAGE, JOINT_STATES, Topic
+from ja_common.topics import CAMERA_INFO, CLOCK, IMAGE, JOINT_COMMANDS, JOINT_STATES, Topic
 from ja_diagnostics.faults.disturbance import Disturbance
 
 HEAD_TOPICS = (CLOCK, JOINT_STATES, CAMERA_INFO, IMAGE)
@@ -33,6 +33,7 @@ class Relay(GraphNode):
         super().__init__('fault_relay', **node_kwargs)
         self._disturbances: dict[Topic, Disturbance] = {}
         self.clock_ahead_s = 0.0
+        self._command_publisher: Publisher | None = None
         self._publishers_of: dict[Topic, Publisher] = {}
         for topic in HEAD_TOPICS:
             self._disturbances[topic] = Disturbance()
@@ -47,6 +48,16 @@ class Relay(GraphNode):
         """Replace the disturbance of topics; messages that the old one still holds are lost."""
         for topic in topics:
             self._disturbances[topic] = make()
+
+    def start_commanding(self) -> None:
+        """Be another commander of the head, which sends nothing yet: the gate has to hold."""
+        self._command_publisher = self.create_topic_publisher(JOINT_COMMANDS)
+
+    def stop_commanding(self) -> None:
+        """Leave the head to the gate again."""
+        if self._command_publisher is not None:
+            self.destroy_publisher(self._command_publisher)
+            self._command_publisher = None
 
     def _queue_callback(self, topic: Topic) -> Callable[[Any], None]:
         def queue(message: Any) -> None:

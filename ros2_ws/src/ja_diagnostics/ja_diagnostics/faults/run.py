@@ -7,12 +7,13 @@ from pathlib import Path
 
 from ja_common.private_context import private_executor
 from ja_common.ros_arguments import parameter_arguments
-from ja_diagnostics.faults.catalogue import Fault, Graph, faults
+from ja_diagnostics.faults.catalogue import HUNG_AFTER_S, Fault, Graph, faults
 from ja_diagnostics.faults.relay import AROUND, Relay
 from ja_diagnostics.faults.watcher import Watcher
 from ja_runner.graph import sim_graph, with_arguments
 from ja_runner.node_spec import NodeSpec
-from ja_runner.supervisor import Supervisor
+from ja_runner.running_nodes import claim_names
+from ja_runner.supervisor import Supervision, Supervisor
 
 # The limits of a rig with a camera of 30 images/s; small images, so that two cores keep up.
 RIG = {
@@ -91,7 +92,8 @@ class FaultRun:
             for spec in place(with_arguments(sim_graph(), arguments))
         ]
         self._graph: Sequence[NodeSpec] = graph
-        self._supervisor = Supervisor(graph, folder / 'log', 'restart', report)
+        supervision = Supervision('restart', HUNG_AFTER_S)
+        self._supervisor = Supervisor(graph, folder / 'log', supervision, report)
         self._report = report
         self.outcomes: list[FaultOutcome] = []
 
@@ -101,7 +103,7 @@ class FaultRun:
 
     def run(self, chosen: Sequence[Fault]) -> int:
         """Run these faults in turn; return the exit code of the graph."""
-        with private_executor() as executor:
+        with claim_names(self._graph), private_executor() as executor:
             watcher = Watcher(context=executor.context)
             relay = Relay(context=executor.context)
             executor.add_node(watcher)
@@ -128,7 +130,7 @@ class FaultRun:
         watcher.restart_pauses()
         began_s = time.monotonic()
         fault.begin(graph)
-        yield from _wait(lambda: time.monotonic() - began_s > fault.lasts_s, fault.lasts_s + 1.0)
+        yield from _wait(lambda: fault.over(graph), fault.lasts_s)
         pause_s = max(watcher.longest_pause_s, time.monotonic() - watcher.decided_s)
         stopped_s = max(watcher.moved_s - began_s, 0.0)
         fault.end(graph)

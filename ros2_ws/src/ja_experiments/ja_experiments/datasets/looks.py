@@ -9,10 +9,12 @@ the learner never receives it.
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import shutil
 import time
+import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from importlib import metadata, resources
@@ -23,8 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ja_common.core.cache import cache_folder
+from ja_common.core.config import ConfigError
 from ja_common.core.detection import caregiver_face
+from ja_common.core.files import why_not_written
 from ja_common.core.geometry import directions_of_rays
+from ja_common.core.safe_files import load_json, read_bytes
 from ja_control.core.attention_cycle import Phase
 from ja_experiments.agents.robot import FixedTurn, Robot
 from ja_experiments.config import ExperimentConfig
@@ -37,6 +42,7 @@ POOL = 125
 FRESH = 1000
 """Number of further looks at the same person, for tests."""
 IMAGE_SIZE = (320, 240)
+_LARGEST_BYTES = 2**26
 _ASIDE_RAD = (0.35, 0.0)
 _MADE_BY = ('ja_common', 'ja_perception', 'ja_control', 'ja_sim')
 _LIBRARIES = ('mujoco', 'numpy', 'opencv-python-headless')
@@ -94,7 +100,10 @@ def load_looks(
         progress(count)
         return looks
     looks = (render or _render)(scene, seed, count, progress)
-    _write(kept, maker, looks)
+    try:
+        _write(kept, maker, looks)
+    except OSError as error:
+        report(f'The looks are used, but not cached: {why_not_written(kept, error)}.')
     return looks
 
 
@@ -103,36 +112,43 @@ class _NotUsableError(Exception):
 
 
 def _read(kept: Path, maker: dict[str, Any]) -> Looks:
+    if not kept.exists():
+        raise _NotUsableError(f'none are cached in {kept}')
     try:
-        manifest = json.loads((kept / 'manifest.json').read_text(encoding='utf-8'))
-        data = (kept / 'looks.npz').read_bytes()
-    except FileNotFoundError:
-        raise _NotUsableError(f'none are cached in {kept}') from None
-    except (OSError, ValueError) as error:
+        manifest = load_json(kept / 'manifest.json')
+        data = read_bytes(kept / 'looks.npz', _LARGEST_BYTES)
+    except ConfigError as error:
         raise _NotUsableError(f'those in {kept} cannot be read: {error}') from None
-    if not isinstance(manifest, dict) or manifest.get('sha256') != _sha256([data]):
+    made_by = manifest.get('made_by')
+    if manifest.get('sha256') != _sha256([data]) or not isinstance(made_by, dict):
         raise _NotUsableError(f'those in {kept} are damaged')
-    made_by = manifest.get('made_by', {})
     changed = [key for key, value in maker.items() if made_by.get(key) != value]
     if changed:
         raise _NotUsableError(f'those in {kept} were made with other {", ".join(changed)}')
-    with np.load(kept / 'looks.npz', allow_pickle=False) as arrays:
-        return Looks(**{field.name: arrays[field.name] for field in fields(Looks)})
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+            return Looks(**{field.name: arrays[field.name] for field in fields(Looks)})
+    except (KeyError, ValueError, OSError, zipfile.BadZipFile) as error:
+        raise _NotUsableError(f'those in {kept} cannot be read: {error}') from None
 
 
 def _write(kept: Path, maker: dict[str, Any], looks: Looks) -> None:
     """Write the folder in one atomic step: two processes may write it at the same time."""
     made = kept.with_name(f'.{kept.name}.{os.getpid()}')
-    made.mkdir(parents=True)
-    np.savez_compressed(made / 'looks.npz', **vars(looks))
-    manifest = {
-        'sha256': _sha256([(made / 'looks.npz').read_bytes()]),
-        'made_at': time.strftime('%Y-%m-%dT%H:%M:%S%z'),
-        'made_by': maker,
-    }
-    (made / 'manifest.json').write_text(json.dumps(manifest, indent=2), encoding='utf-8')
-    shutil.rmtree(kept, ignore_errors=True)
-    made.rename(kept)
+    try:
+        made.mkdir(parents=True)
+        np.savez_compressed(made / 'looks.npz', **vars(looks))
+        manifest = {
+            'sha256': _sha256([(made / 'looks.npz').read_bytes()]),
+            'made_at': time.strftime('%Y-%m-%dT%H:%M:%S%z'),
+            'made_by': maker,
+        }
+        (made / 'manifest.json').write_text(json.dumps(manifest, indent=2), encoding='utf-8')
+        shutil.rmtree(kept, ignore_errors=True)
+        made.rename(kept)
+    except OSError:
+        shutil.rmtree(made, ignore_errors=True)
+        raise
 
 
 def _maker(scene: str, seed: int, count: int) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from ja_experiments.config import ExperimentConfig
 from ja_experiments.datasets.looks import Looks
 from ja_experiments.paper.outcomes import NOTHING, Outcomes
 from ja_experiments.paper.task import ATTENDED
+from ja_learning.core.compiled import compiled
 from ja_learning.core.network import ThreeLayerNetwork, face_inputs
 from ja_learning.core.trial import SAME_POSTURE_RAD
 from ja_sim.core.specs import ObjectsSpec
@@ -215,7 +216,7 @@ def _weights(network: ThreeLayerNetwork) -> _Weights:
     return _Weights(*parameters, *(np.zeros_like(array) for array in parameters))
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _run_trials(  # type: ignore[no-untyped-def]
     rules, looks, weights, rng, trials_before, learning, fixated, in_view, pan_rad, shifts
 ):
@@ -417,7 +418,7 @@ def _propose(rules, weights, drive, pan, tilt):  # type: ignore[no-untyped-def]
     return pan_out * rules.angle_scale, tilt_out * rules.angle_scale
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _predict(rules, weights, looks):  # type: ignore[no-untyped-def]
     commands = np.empty((len(looks.inputs), 2))
     drive = np.empty(len(weights.hidden), np.float32)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import platform
@@ -16,6 +17,7 @@ from jinja2 import Environment, StrictUndefined
 from markdown_it import MarkdownIt
 from matplotlib.figure import Figure
 
+from ja_common.core.files import write_file
 from ja_common.core.statistics import Estimate, over_seeds
 from ja_experiments.paper import figures
 from ja_experiments.paper.episodes import choose_examples
@@ -35,17 +37,21 @@ _STYLE = (
 
 
 def write_report(study: Study, folder: Path) -> Path:
-    """Write the report to a folder, which is created; return the path of report.md."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, picture in _pictures(study).items():
-        picture.savefig(folder / f'{name}.png')
-    text = _markdown(study)
-    (folder / 'report.md').write_text(text, encoding='utf-8')
-    (folder / 'report.html').write_text(_html(text), encoding='utf-8')
+    """Write the report to a folder, which is created; return the path of report.md.
+
+    Raises SaveError.
+    """
+    # First the numbers: a disk that gets full costs pictures rather than them.
+    write_file(folder / 'results.json', json.dumps(_numbers(study), indent=1))
     config = yaml.safe_dump(_configuration(study), sort_keys=False, allow_unicode=True)
-    (folder / 'config.yaml').write_text(config, encoding='utf-8')
-    numbers = json.dumps(_numbers(study), indent=1)
-    (folder / 'results.json').write_text(numbers, encoding='utf-8')
+    write_file(folder / 'config.yaml', config)
+    text = _markdown(study)
+    write_file(folder / 'report.md', text)
+    write_file(folder / 'report.html', _html(text))
+    for name, picture in _pictures(study).items():
+        image = io.BytesIO()
+        picture.savefig(image, format='png')
+        write_file(folder / f'{name}.png', image.getvalue())
     return folder / 'report.md'
 
 

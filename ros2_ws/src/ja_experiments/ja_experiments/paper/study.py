@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import torch
-import yaml
 
+from ja_common.core.safe_files import load_yaml
 from ja_experiments.config import READINGS, reading
 from ja_experiments.datasets.looks import FRESH, POOL, load_looks
 from ja_experiments.datasets.recorded import recorded_materials
@@ -111,8 +111,7 @@ def compile_kernel(materials: Materials) -> None:
 def read_ablations(path: Path | None = None) -> dict[str, dict[str, Any]]:
     """Return settings by the name of the variant, from a YAML file or from the package's own."""
     shipped = resources.files('ja_experiments.paper') / 'ablations.yaml'
-    text = path.read_text('utf-8') if path else shipped.read_text('utf-8')
-    return yaml.safe_load(text)
+    return load_yaml(path or Path(str(shipped)))
 
 
 def prepare_materials(scene: str, looks_seed: int, progress: ProgressBars) -> Materials:

@@ -61,6 +61,10 @@ class BackgroundLearner:
         """Return the errors of updates, and of `after_update`, since the last call."""
         return [self._errors.popleft() for _ in range(len(self._errors))]
 
+    def call_later(self, function: Callable[[Learner], None]) -> Future[None]:
+        """Call a function with the learner after all pending updates; return at once."""
+        return self._thread.submit(function, self._learner)
+
     def call_with_learner(self, function: Callable[[Learner], Answer]) -> Answer:
         """Wait for all pending updates, call a function with the learner, and return its answer.
 

@@ -3,11 +3,13 @@
 import fcntl
 import os
 import re
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 from ja_common.core.config import ConfigError, Configuration, parameter
+from ja_common.core.files import why_not_written
 from ja_learning.core.checkpoint import load_checkpoint, save_checkpoint
 from ja_learning.core.learner import Learner
 
@@ -49,22 +51,15 @@ class CheckpointFolder:
     def __init__(self, folder: Path, config: CheckpointConfig) -> None:
         """Make the folder if need be.
 
-        Raises ConfigError when another process has it, OSError when it cannot be written.
+        Raises ConfigError when another process has it, or when it cannot be made.
         """
         self.folder = folder
         self.config = config
         self._saved_trials = 0
-        folder.mkdir(parents=True, exist_ok=True)
-        self._lock = open(folder / '.lock', 'w')  # noqa: SIM115 (held until `close`)
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self._lock.close()
-            raise ConfigError(
-                f'{folder}: another learner keeps its checkpoints there: name another folder'
-            ) from None
+        self._lock = _lock(folder)
         for unfinished in folder.glob('.*.npz.*'):  # its writer was killed
-            unfinished.unlink()
+            with suppress(OSError):
+                unfinished.unlink()
 
     def close(self) -> None:
         """Let another process have the folder."""
@@ -75,11 +70,12 @@ class CheckpointFolder:
         number = max(map(_number, self._newest_first()), default=0) + 1
         path = self.folder / f'{learner.kind}-{number:06d}.npz'
         save_checkpoint(path, learner.state(), _description(learner))
+        self._saved_trials = learner.trials
         self._link(path)
         ours = [other for other in self._newest_first() if _kind(other) == learner.kind]
         for old in ours[self.config.checkpoints_kept :]:
-            old.unlink()
-        self._saved_trials = learner.trials
+            with suppress(OSError):  # the new one is saved all the same
+                old.unlink()
         return path
 
     def save_when_due(self, learner: Learner) -> None:
@@ -125,6 +121,27 @@ class CheckpointFolder:
             os.replace(temporary, self.folder / LAST)
         except OSError:
             pass  # a memory card's file system may know no links
+
+
+def _lock(folder: Path) -> IO[bytes]:
+    """Make a folder and lock it; return the file that holds the lock until it is closed."""
+    path = folder / '.lock'
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        # Only read: a learner starts again also where its disk has become full or read-only.
+        lock = os.fdopen(os.open(path, os.O_RDONLY | os.O_CREAT, 0o666), 'rb')
+    except OSError as error:
+        raise ConfigError(why_not_written(path, error)) from None
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        lock.close()
+        if not isinstance(error, BlockingIOError):
+            raise ConfigError(f'{path} cannot be locked ({error.strerror})') from None
+        raise ConfigError(
+            f'{folder}: another learner keeps its checkpoints there: name another folder'
+        ) from None
+    return lock
 
 
 def restore_checkpoint(path: Path, learner: Learner) -> None:

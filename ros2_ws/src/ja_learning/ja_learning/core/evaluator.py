@@ -66,7 +66,8 @@ class InternalEvaluator:
         if nearest is None:
             return None
         distance = np.hypot(*seen[nearest].ray)
-        if any(np.hypot(*d.ray) < distance for d in detections if d.kind is Kind.FACE):
+        faces = [d for d in detections if d.kind is Kind.FACE]
+        if not all(np.hypot(*face.ray) >= distance for face in faces):
             return None
         return directions_of_rays(posture.position, seen[nearest].ray)
 

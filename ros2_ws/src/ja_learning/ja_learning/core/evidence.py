@@ -19,6 +19,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ja_learning.core.checkpoint_arrays import numbers
 from ja_learning.core.trial import FACE_SHAPE
 
 _OTHERS = 15
@@ -62,13 +63,11 @@ class Evidence:
         return {'evidence.nats': self.nats.copy(), 'evidence.faces': faces}
 
     def restore(self, arrays: dict[str, NDArray]) -> None:
-        """Take the state of `state()`; KeyError or ValueError, and no change, if it misfits."""
-        nats, faces = arrays['evidence.nats'], arrays['evidence.faces']
-        if nats.shape != self.nats.shape or not np.isfinite(nats).all():
-            raise ValueError(f'evidence must be {len(self.nats)} finite numbers, found {nats}')
-        if faces.dtype != np.uint8 or faces.shape != (min(len(faces), _OTHERS), *FACE_SHAPE):
-            raise ValueError(f'evidence cannot be over faces of shape {faces.shape}')
-        self.nats, self._others = nats.astype(float), list(faces.copy())
+        """Take the state of `state()`; ValueError, and no change, if it misfits."""
+        nats = numbers(arrays, 'evidence.nats', self.nats.shape, np.float64)
+        known = min(len(np.atleast_1d(arrays.get('evidence.faces', ()))), _OTHERS)
+        faces = numbers(arrays, 'evidence.faces', (known, *FACE_SHAPE), np.uint8)
+        self.nats, self._others = nats, list(faces)
 
 
 class ChangeAlarm:

@@ -25,6 +25,7 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import nn
 
+from ja_learning.core.checkpoint_arrays import count, counts, numbers
 from ja_learning.core.evidence import ChangeAlarm, Evidence
 from ja_learning.core.gaze_line_belief import GazeLineBelief
 from ja_learning.core.gaze_line_config import GazeLineConfig
@@ -41,6 +42,8 @@ from ja_learning.core.trial import FACE_SHAPE, Trial
 # the more trials it takes to tell one from another. A small number is a fast annealing rate.
 _FASTEST_ANNEALING, _SLOWEST_ANNEALING = 0.25, 2.0
 _INITIAL_INVERSE_TEMPERATURE = 0.1
+# AdamW counts its steps in 32 bits of a float; beyond this it stands still.
+_MOST_STEPS = 2.0**24
 # With how many negatives the places of a trial are compared: in each training step, drawn again;
 # to weigh a trial, once, where the effect of the draw would be taken for evidence.
 _TRAINING_NEGATIVES, _WEIGHING_NEGATIVES = 64, 256
@@ -302,34 +305,33 @@ class GazeLineLearner:
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
         """Take the state of `state()`.
 
-        Raises ValueError, and changes nothing, if it is another learner's or not finite.
+        Raises ValueError, and changes nothing, if it is not one of this learner.
         """
-        for name, array in arrays.items():
-            if array.dtype.kind == 'f' and not np.isfinite(array).all():
-                raise ValueError(f'{name} holds numbers that are not finite')
+        members = self.config.members
+        networks = [_loaded(self._network, arrays, p) for p in ('network.', 'mean.')]
+        moments = {
+            p: _loaded_moments(arrays, f'optimiser.{name}.', tuple(p.shape))
+            for name, p in self._network.named_parameters()
+        }
+        memory = ReplayMemory.restored(arrays, self.config.replay_memory)
+        evidence = Evidence(members + 1)
+        evidence.restore(arrays)
+        steps, trials = count(arrays, 'steps'), count(arrays, 'trials')
+        doubt = float(numbers(arrays, 'doubt', (), np.float64, low=0.0))
+        doubtful = count(arrays, 'doubtful_trials')
+        began = counts(arrays, 'began', (members,))
+        annealing = numbers(arrays, 'annealing', (members,), np.float64, low=0.01)
+        random = torch.Generator()
+        state = numbers(arrays, 'random', tuple(random.get_state().shape), np.uint8)
         try:
-            networks = [_loaded(self._network, arrays, p) for p in ('network.', 'mean.')]
-            memory = ReplayMemory.restored(arrays, self.config.replay_memory)
-            evidence = Evidence(self.config.members + 1)
-            evidence.restore(arrays)
-            steps, trials = int(arrays['steps']), int(arrays['trials'])
-            doubt, doubtful = float(arrays['doubt']), int(arrays['doubtful_trials'])
-            began = arrays['began'].reshape(self.config.members).astype(int)
-            annealing = arrays['annealing'].reshape(self.config.members).copy()
-            random = torch.Generator()
-            random.set_state(torch.from_numpy(arrays['random'].copy()))
-        except (KeyError, RuntimeError, TypeError, IndexError) as error:
-            raise ValueError(f'not the state of this learner: {error}') from None
+            random.set_state(torch.from_numpy(state))
+        except RuntimeError as error:
+            raise ValueError(f'random is no state of a generator: {error}') from None
         self._random, self._memory, self._evidence = random, memory, evidence
         self._network.load_state_dict(networks[0])
         self._mean.load_state_dict(networks[1])
-        for name, p in self._network.named_parameters():
-            prefix = f'optimiser.{name}.'
-            kept = {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
-            if kept:
-                self._optimiser.state[p] = {
-                    k: torch.from_numpy(np.array(v)) for k, v in kept.items()
-                }
+        self._optimiser.state.clear()
+        self._optimiser.state.update({p: kept for p, kept in moments.items() if kept})
         self._steps, self.trials, self._belief = steps, trials, None
         self._annealing, self._began = annealing, began
         self._alarm.doubt, self._alarm.doubtful_trials = doubt, doubtful
@@ -361,12 +363,21 @@ def _annealing(members: int) -> NDArray[np.float64]:
 def _loaded(
     like: nn.Module, arrays: dict[str, NDArray[Any]], prefix: str
 ) -> dict[str, torch.Tensor]:
-    found = {}
-    for name, tensor in like.state_dict().items():
-        array = arrays[prefix + name]
-        if array.shape != tuple(tensor.shape):
-            raise ValueError(
-                f'{prefix}{name} must have shape {tuple(tensor.shape)}, found {array.shape}'
-            )
-        found[name] = torch.from_numpy(array.copy())
-    return found
+    return {
+        name: torch.from_numpy(numbers(arrays, prefix + name, tuple(tensor.shape)))
+        for name, tensor in like.state_dict().items()
+    }
+
+
+def _loaded_moments(
+    arrays: dict[str, NDArray[Any]], prefix: str, shape: tuple[int, ...]
+) -> dict[str, torch.Tensor]:
+    """Return what AdamW keeps of a parameter; nothing before its first step."""
+    if not any(name.startswith(prefix) for name in arrays):
+        return {}
+    kept = {
+        'step': numbers(arrays, f'{prefix}step', (), low=0.0, high=_MOST_STEPS),
+        'exp_avg': numbers(arrays, f'{prefix}exp_avg', shape),
+        'exp_avg_sq': numbers(arrays, f'{prefix}exp_avg_sq', shape, low=0.0),
+    }
+    return {name: torch.from_numpy(array) for name, array in kept.items()}

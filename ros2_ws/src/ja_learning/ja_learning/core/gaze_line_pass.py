@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from torch import nn
 
+from ja_learning.core.compiled import compiled
 from ja_learning.core.gaze_line_network import LEAST_VARIANCE, GazeLineNetwork
 
 # Weights (inputs, outputs) and biases (outputs,), for each member where there is one axis more;
@@ -58,7 +59,7 @@ def _array(parameter: nn.Parameter | None) -> NDArray[np.float32]:
     return parameter.detach().numpy().copy()
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _gazes(faces, first, second, third, hidden, gaze):  # type: ignore[no-untyped-def]
     members, channels = len(hidden[0]), first[0].shape[1] // len(hidden[0])
     found = np.zeros((members, len(faces), 2))

@@ -7,6 +7,7 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 
+from ja_learning.core.checkpoint_arrays import count, numbers
 from ja_learning.core.evidence import Evidence
 from ja_learning.core.network_config import NetworkConfig
 from ja_learning.core.trial import FACE_SHAPE, Trial
@@ -133,25 +134,21 @@ class ThreeLayerNetwork:
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
         """Take the state of `state()`.
 
-        Raises ValueError, and changes nothing, if it is another network's or not finite.
+        Raises ValueError, and changes nothing, if it is not one of this network.
         """
-        wanted = {name: tuple(p.shape) for name, p in self._parameters.items()} | {'trials': ()}
-        for name, shape in wanted.items():
-            _check_array(name, arrays.get(name), shape)
-            if f'momentum_{name}' in arrays:
-                _check_array(f'momentum_{name}', arrays[f'momentum_{name}'], shape)
-        evidence = Evidence()
-        try:
-            evidence.restore(arrays)
-        except KeyError as error:
-            raise ValueError(f'{error} is missing') from None
+        shapes = {name: tuple(p.shape) for name, p in self._parameters.items()}
+        weights = {name: numbers(arrays, name, shape) for name, shape in shapes.items()}
+        momenta = {
+            name: torch.from_numpy(numbers(arrays, f'momentum_{name}', shape))
+            for name, shape in shapes.items()
+            if f'momentum_{name}' in arrays
+        }
+        trials, evidence = count(arrays, 'trials'), Evidence()
+        evidence.restore(arrays)
         for name, p in self._parameters.items():
-            p.data.copy_(torch.from_numpy(arrays[name]))
-            momentum = arrays.get(f'momentum_{name}')
-            self._optimiser.state[p]['momentum_buffer'] = (
-                None if momentum is None else torch.from_numpy(momentum.copy())
-            )
-        self.trials, self._evidence = int(arrays['trials']), evidence
+            p.data.copy_(torch.from_numpy(weights[name]))
+            self._optimiser.state[p]['momentum_buffer'] = momenta.get(name)
+        self.trials, self._evidence = trials, evidence
 
     def _forward(self, inputs: torch.Tensor) -> torch.Tensor:
         p = self._parameters
@@ -175,11 +172,3 @@ def face_inputs(faces: ArrayLike, scaling: str) -> NDArray[np.float64]:
         spread = np.maximum(pixels.std(axis=-1, keepdims=True), 1e-3)
         pixels = (pixels - pixels.mean(axis=-1, keepdims=True)) / spread
     return pixels
-
-
-def _check_array(name: str, array: NDArray[Any] | None, shape: tuple[int, ...]) -> None:
-    if array is None or array.shape != shape or array.dtype.kind not in 'fiu':
-        found = 'nothing' if array is None else f'{array.dtype} of shape {array.shape}'
-        raise ValueError(f'{name} must be numbers of shape {shape}, found {found}')
-    if not np.isfinite(array).all():
-        raise ValueError(f'{name} holds numbers that are not finite')

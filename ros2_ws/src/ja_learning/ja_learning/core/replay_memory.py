@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ja_learning.core.checkpoint_arrays import counts, numbers
 from ja_learning.core.trial import FACE_SHAPE
 
 MOST_CANDIDATES = 32
@@ -69,16 +70,16 @@ class ReplayMemory:
 
     @classmethod
     def restored(cls, arrays: dict[str, NDArray[Any]], capacity: int) -> 'ReplayMemory':
-        """Make a memory from `state()`; KeyError or ValueError if it is none."""
-        faces, counts, places = (
-            arrays[name] for name in ('faces', 'candidate_counts', 'candidates')
-        )
-        if faces.dtype != np.uint8 or faces.shape != (len(counts), *FACE_SHAPE):
-            raise ValueError(f'{len(counts)} faces must be uint8 of {FACE_SHAPE}')
-        if places.shape != (counts.sum(), 2):
-            raise ValueError(f'candidates {places.shape} do not fit their counts {counts}')
+        """Make a memory from `state()`; ValueError if it is none."""
+        seen_in = counts(arrays, 'candidate_counts')
+        if len(seen_in) > capacity or (seen_in > MOST_CANDIDATES).any():
+            raise ValueError(
+                f'candidate_counts must be at most {capacity}, each up to {MOST_CANDIDATES}'
+            )
+        faces = numbers(arrays, 'faces', (len(seen_in), *FACE_SHAPE), np.uint8)
+        places = numbers(arrays, 'candidates', (int(seen_in.sum()), 2))
         memory = cls(capacity)
-        for face, seen in zip(faces, np.split(places, np.cumsum(counts))[:-1], strict=True):
+        for face, seen in zip(faces, np.split(places, np.cumsum(seen_in))[:-1], strict=True):
             memory.remember_trial(face, seen)
         return memory
 

@@ -1,6 +1,7 @@
 """Pictures from a webcam, a video file, an image folder or a single image."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Protocol
 
@@ -8,6 +9,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ja_common.core.config import ConfigError
+from ja_common.core.picture_size import MOST_PIXELS, picture_size
+from ja_common.core.safe_files import read_bytes
+
+_LARGEST_PICTURE_BYTES = 2**28
 _PICTURE_SUFFIXES = {'.png', '.jpg', '.jpeg', '.bmp', '.tif', '.tiff', '.webp', '.ppm', '.pgm'}
 
 
@@ -114,6 +120,22 @@ class Video:
         self._capture = cv2.VideoCapture(str(self._path))
 
 
+def _read_picture(path: Path) -> NDArray[np.uint8]:
+    try:
+        data = read_bytes(path, _LARGEST_PICTURE_BYTES)
+    except ConfigError as error:
+        raise SourceError(str(error)) from None
+    width, height = picture_size(data) or (0, 0)
+    if width * height > MOST_PIXELS:
+        raise SourceError(f"'{path}' is larger than {MOST_PIXELS} pixels")
+    picture = None
+    with suppress(cv2.error):  # a picture of another format that is too large for OpenCV
+        picture = cv2.imread(str(path), cv2.IMREAD_COLOR_RGB)
+    if picture is None:
+        raise SourceError(f"'{path}' cannot be read as a picture")
+    return picture.astype(np.uint8, copy=False)
+
+
 class Pictures:
     """Still pictures, one after the other."""
 
@@ -137,9 +159,7 @@ class Pictures:
     def _stream(self) -> Iterator[NDArray[np.uint8]]:
         while True:
             for path in self._paths:
-                picture = cv2.imread(str(path), cv2.IMREAD_COLOR_RGB)
-                if picture is None:
-                    raise SourceError(f"'{path}' cannot be read as a picture")
+                picture = _read_picture(path)
                 for _ in range(self._still_frames):
                     yield picture
             if not self._loop:

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata, resources
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 import cv2
@@ -21,7 +21,9 @@ from jinja2 import Environment, StrictUndefined
 from numpy.typing import NDArray
 
 from ja_common.core.config import ConfigError
-from ja_learning.core.trial import Trial, checked_face
+from ja_common.core.picture_size import picture_size
+from ja_common.core.safe_files import read_bytes
+from ja_learning.core.trial import FACE_SHAPE, Trial, checked_face
 
 TABLE, FACES, CARD = 'trials.parquet', 'faces', 'README.md'
 _LICENCE_UNSTATED = 'not stated: ask the person who recorded it before you pass it on'
@@ -60,6 +62,12 @@ COLUMNS: Mapping[str, tuple[pyarrow.DataType, str]] = {
     'label_tilt_rad': (pyarrow.float64(), 'the same for tilt [rad]'),
 }
 """Type and meaning of every column, in their order."""
+
+_SCHEMA = pyarrow.schema([(name, kind) for name, (kind, _) in COLUMNS.items()])
+# What is read: of a table, tens of millions of trials; of a picture of 750 pixels, a hundredfold.
+_MOST_VALUES = 10**8
+_LARGEST_BYTES = 2**30
+_LARGEST_FACE_BYTES = 2**16
 
 
 @dataclass(frozen=True)
@@ -113,8 +121,7 @@ def write_dataset(
         raise ConfigError('no trial ended in a fixation: there is nothing to write')
     card = _card(recordings, known, options, licence)
     (folder / CARD).write_text(card, encoding='utf-8')
-    schema = pyarrow.schema([(name, kind) for name, (kind, _) in COLUMNS.items()])
-    pyarrow.parquet.write_table(pyarrow.Table.from_pylist(rows, schema), folder / TABLE)
+    pyarrow.parquet.write_table(pyarrow.Table.from_pylist(rows, _SCHEMA), folder / TABLE)
     return folder / CARD
 
 
@@ -123,16 +130,43 @@ def read_dataset(folder: Path) -> list[TrialSample]:
 
     Raises ConfigError when the folder holds no data set, or a damaged one.
     """
+    if not (folder / TABLE).is_file():
+        raise ConfigError(f'{folder} is no data set: it has no {TABLE}')
+    samples = []
+    for number, row in enumerate(_read_table(folder / TABLE).to_pylist(), 1):
+        try:
+            samples.append(_sample(folder, row))
+        except (ValueError, TypeError) as error:
+            if isinstance(error, ConfigError):
+                raise
+            raise ConfigError(f'{folder / TABLE}, row {number}: {error}') from None
+    return samples
+
+
+def _read_table(path: Path) -> pyarrow.Table:
+    """Return our columns, in our types. Raises ConfigError."""
     try:
-        rows = pyarrow.parquet.read_table(folder / TABLE).to_pylist()
-    except FileNotFoundError:
-        raise ConfigError(f'{folder} is no data set: it has no {TABLE}') from None
-    except pyarrow.ArrowInvalid as error:
-        raise ConfigError(f'{folder / TABLE} cannot be read: {error}') from None
-    lacking = set(COLUMNS).difference(*rows[:1])
-    if lacking:
-        raise ConfigError(f'{folder / TABLE} lacks {", ".join(sorted(lacking))}')
-    return [_sample(folder, row) for row in rows]
+        with pyarrow.parquet.ParquetFile(path) as file:
+            lacking = COLUMNS.keys() - set(file.schema_arrow.names)
+            if lacking:
+                raise ConfigError(f'{path} lacks {", ".join(sorted(lacking))}')
+            _check_size(path, file.metadata)
+            return file.read(list(COLUMNS)).select(list(COLUMNS)).cast(_SCHEMA)
+    except (pyarrow.ArrowException, OSError, ValueError) as error:
+        if isinstance(error, ConfigError):
+            raise
+        why = str(error).partition('\n')[0][:200]
+        raise ConfigError(f'{path} cannot be read: {why}') from None
+
+
+def _check_size(path: Path, metadata: pyarrow.parquet.FileMetaData) -> None:
+    """Refuse a small file that would unpack to a large table."""
+    groups = [metadata.row_group(number) for number in range(metadata.num_row_groups)]
+    columns = [group.column(number) for group in groups for number in range(group.num_columns)]
+    values = sum(column.num_values for column in columns)
+    size = sum(column.total_uncompressed_size for column in columns)
+    if values > _MOST_VALUES or size > _LARGEST_BYTES:
+        raise ConfigError(f'{path} holds {values} values in {size} bytes: more than are read')
 
 
 def _row(number: int, sample: TrialSample) -> dict[str, Any]:
@@ -160,19 +194,14 @@ def _row(number: int, sample: TrialSample) -> dict[str, Any]:
 
 
 def _sample(folder: Path, row: Mapping[str, Any]) -> TrialSample:
-    picture = cv2.imread(str(folder / row['face']), cv2.IMREAD_UNCHANGED)
-    try:
-        face = checked_face(np.asarray(picture))
-    except ValueError as error:
-        raise ConfigError(f'{folder / row["face"]}: {error}') from None
-    trial = Trial(
-        face,
-        np.array([row['face_pan_rad'], row['face_tilt_rad']], float),
-        _pairs(row, 'postures'),
-        np.array([row['fixation_pan_rad'], row['fixation_tilt_rad']]),
-        _pairs(row, 'candidates'),
-        row['seen_before_shift'],
-    )
+    postures, candidates = _pairs(row, 'postures'), _pairs(row, 'candidates')
+    face_at, fixation = _direction(row, 'face'), _direction(row, 'fixation')
+    seen = row['seen_before_shift']
+    if face_at is None or fixation is None or not len(postures):
+        raise ValueError('the directions of the face, of the postures or of the fixation lack')
+    if seen < 0:
+        raise ValueError(f'seen_before_shift = {seen} is no count')
+    trial = Trial(_face(folder, row['face']), face_at, postures, fixation, candidates, seen)
     return TrialSample(
         trial,
         row['recording'],
@@ -185,8 +214,25 @@ def _sample(folder: Path, row: Mapping[str, Any]) -> TrialSample:
     )
 
 
+def _face(folder: Path, name: str) -> NDArray[np.uint8]:
+    """Return a face; its file lies in the folder, whatever the table says."""
+    if PurePath(name).is_absolute() or '..' in PurePath(name).parts:
+        raise ValueError(f'face = {name[:100]!r} is not in the folder of the data set')
+    data = np.frombuffer(read_bytes(folder / name, _LARGEST_FACE_BYTES), np.uint8)
+    if data.size and picture_size(data.data) not in (None, FACE_SHAPE[::-1]):
+        raise ConfigError(f'{folder / name} is no picture of a face: it has another size')
+    picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    try:
+        return checked_face(np.asarray(picture))
+    except ValueError as error:
+        raise ConfigError(f'{folder / name}: {error}') from None
+
+
 def _pairs(row: Mapping[str, Any], name: str) -> NDArray[np.float64]:
-    return np.column_stack([np.array(row[f'{name}_{axis}_rad'], float) for axis in _AXES])
+    pairs = np.column_stack([np.array(row[f'{name}_{axis}_rad'], float) for axis in _AXES])
+    if pairs.shape[1:] != (2,) or not np.isfinite(pairs).all():
+        raise ValueError(f'{name} are no pairs of angles')
+    return pairs
 
 
 def _direction(row: Mapping[str, Any], name: str) -> NDArray[np.float64] | None:

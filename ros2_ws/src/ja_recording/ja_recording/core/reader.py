@@ -1,23 +1,18 @@
-"""Read recordings: MCAP files of any ROS 2 recorder, unfinished files included."""
+"""Read recordings: MCAP files of any ROS 2 recorder, unfinished and damaged files included."""
 
-import io
-import struct
+import re
 import sys
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from mcap.exceptions import McapError
-from mcap.reader import SeekingReader
-from mcap.records import Channel, Message, Schema
-from mcap.stream_reader import StreamReader
-from mcap.summary import Summary
-from zstandard import ZstdError
+from mcap.records import Channel
 
 from ja_common.core.config import ConfigError
+from ja_recording.core.mcap_file import LATEST_NS, MOST_TOPICS, McapFile, read_mcap
+from ja_recording.core.mcap_records import DamagedError
 
-# What a file that ends in the middle of a record, or of a chunk, can raise.
-_CUT_SHORT = (McapError, ZstdError, struct.error, EOFError, ValueError)
+_TOPIC = re.compile(r'(/[A-Za-z_][A-Za-z0-9_]*)+')
 
 
 @dataclass(frozen=True)
@@ -46,24 +41,41 @@ class Recording:
     """
 
     def __init__(self, path: Path) -> None:
-        self._paths = (
-            sorted(path.glob('*.mcap'), key=_order_in_folder) if path.is_dir() else [path]
-        )
-        if not self._paths or not all(each.is_file() for each in self._paths):
+        paths = sorted(path.glob('*.mcap'), key=_order_in_folder) if path.is_dir() else [path]
+        if not paths or not all(each.is_file() for each in paths):
             raise ConfigError(f'{path}: no recording (.mcap) there')
-        files = [_McapFile(each) for each in self._paths]
-        self.unfinished = [file.path for file in files if file.unfinished]
-        self.topics: dict[str, RecordedTopic] = {}
-        for file in files:
-            self.topics |= {topic.name: topic for topic in file.topics()}
-        spans = [span for file in files if (span := file.span())]
-        self.first_ns = min((span[0] for span in spans), default=0)
-        self.last_ns = max((span[1] for span in spans), default=0)
+        self._files = [_read_file(each) for each in paths]
+        self.unfinished = [file.path for file in self._files if not file.finished]
+        self._topics_of = {file.path: _topics(file) for file in self._files}
+        self.topics = {
+            topic.name: topic for topics in self._topics_of.values() for topic in topics.values()
+        }
+        if len(self.topics) > MOST_TOPICS:
+            raise ConfigError(f'{path} has {len(self.topics)} topics, more than {MOST_TOPICS}')
+        parts = [part for file in self._files for part in file.parts.values()]
+        stamps = [min(part.first_ns, LATEST_NS) for part in parts]
+        self.first_ns = min(stamps, default=0)
+        self.last_ns = max([min(part.last_ns, LATEST_NS) for part in parts], default=0)
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RecordedMessage]:
-        """Yield the messages of some topics (None: all) in the order of publication."""
-        for path in self._paths:
-            yield from _McapFile(path).messages(topics)
+        """Yield the messages of some topics (None: all) in the order of publication.
+
+        Damaged parts are left out, and named on stderr at the end. Raises ConfigError when a file
+        cannot be read.
+        """
+        for file in self._files:
+            topic_of = {
+                number: topic
+                for number, topic in self._topics_of[file.path].items()
+                if topics is None or topic.name in topics
+            }
+            try:
+                for message in file.messages(topic_of.keys()):
+                    topic = topic_of[message.channel_id]
+                    yield RecordedMessage(topic, message.log_time, message.data)
+            except (DamagedError, OSError) as error:
+                raise ConfigError(f'{file.path} cannot be read: {error}') from None
+            _warn_of_damage(file)
 
 
 def warn_of_unfinished(recording: Recording) -> None:
@@ -72,78 +84,42 @@ def warn_of_unfinished(recording: Recording) -> None:
         print(f'{path} was not closed: it is read up to its last whole message', file=sys.stderr)
 
 
-class _McapFile:
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._summary = self._read_summary()
-        self.unfinished = self._summary is None
-        self._salvaged = self._salvage() if self._summary is None else []
-
-    def topics(self) -> Iterator[RecordedTopic]:
-        if self._summary is None:
-            yield from {message.topic.name: message.topic for message in self._salvaged}.values()
-            return
-        for channel in self._summary.channels.values():
-            yield _topic(self._summary.schemas.get(channel.schema_id), channel)
-
-    def span(self) -> tuple[int, int] | None:
-        if self._summary is None:
-            stamps = [message.stamp_ns for message in self._salvaged]
-            return (stamps[0], stamps[-1]) if stamps else None
-        found = self._summary.statistics
-        if found is None or not found.message_count:
-            return None
-        return found.message_start_time, found.message_end_time
-
-    def messages(self, topics: Collection[str] | None) -> Iterator[RecordedMessage]:
-        if self._summary is None:
-            chosen = (m for m in self._salvaged if topics is None or m.topic.name in topics)
-            yield from chosen
-            return
-        known: dict[int, RecordedTopic] = {}
-        with self.path.open('rb') as stream:
-            for schema, channel, message in SeekingReader(stream).iter_messages(topics):
-                if channel.id not in known:
-                    known[channel.id] = _topic(schema, channel)
-                yield RecordedMessage(known[channel.id], message.log_time, message.data)
-
-    def _read_summary(self) -> Summary | None:
-        try:
-            with self.path.open('rb') as stream:
-                return SeekingReader(stream).get_summary()
-        except _CUT_SHORT:
-            return None
-
-    def _salvage(self) -> list[RecordedMessage]:
-        """Return all whole messages, in order, in memory: the file is one split at most."""
-        schemas: dict[int, Schema] = {}
-        topics: dict[int, RecordedTopic] = {}
-        messages: list[RecordedMessage] = []
-        stream = io.BytesIO(self.path.read_bytes())
-        try:
-            for record in StreamReader(stream).records:
-                if isinstance(record, Schema):
-                    schemas[record.id] = record
-                elif isinstance(record, Channel):
-                    topics[record.id] = _topic(schemas.get(record.schema_id), record)
-                elif isinstance(record, Message):
-                    message = RecordedMessage(
-                        topics[record.channel_id], record.log_time, record.data
-                    )
-                    messages.append(message)
-        except _CUT_SHORT as error:
-            if not messages:
-                raise ConfigError(
-                    f'{self.path}: no message can be read from it: {error}'
-                ) from None
-        return sorted(messages, key=lambda message: message.stamp_ns)
+def _read_file(path: Path) -> McapFile:
+    try:
+        file = read_mcap(path)
+    except (DamagedError, OSError) as error:
+        raise ConfigError(f'{path} cannot be read: {error}') from None
+    why = [*([file.cut_short] if file.cut_short else []), *(why for _, why in file.damaged)]
+    if why and not file.parts:
+        raise ConfigError(f'{path}: no message can be read from it: {why[0]}')
+    return file
 
 
-def _topic(schema: Schema | None, channel: Channel) -> RecordedTopic:
-    if schema is None or channel.message_encoding != 'cdr':
-        raise ConfigError(f'{channel.topic} is not recorded as a ROS 2 message (CDR)')
+def _warn_of_damage(file: McapFile) -> None:
+    damaged = dict(file.damaged)  # the same part may have been met twice
+    if damaged:
+        offset, why = next(iter(damaged.items()))
+        print(
+            f'{file.path}: {len(damaged)} damaged parts were left out; at byte {offset}: {why}',
+            file=sys.stderr,
+        )
+    if file.finished and file.cut_short:
+        print(f'{file.path}: only its beginning can be read: {file.cut_short}', file=sys.stderr)
+
+
+def _topics(file: McapFile) -> dict[int, RecordedTopic]:
+    """Return the topics by the numbers of their channels."""
+    return {number: _topic(file, channel) for number, channel in file.channels.items()}
+
+
+def _topic(file: McapFile, channel: Channel) -> RecordedTopic:
+    if not _TOPIC.fullmatch(channel.topic):
+        raise ConfigError(f'{file.path}: {channel.topic[:100]!r} is no name of a topic')
+    type_name = file.schemas.get(channel.schema_id)
+    if type_name is None or channel.message_encoding != 'cdr':
+        raise ConfigError(f'{file.path}: {channel.topic} is not recorded as a ROS 2 message (CDR)')
     offered = channel.metadata.get('offered_qos_profiles', '')
-    return RecordedTopic(channel.topic, schema.name, offered)
+    return RecordedTopic(channel.topic, type_name, offered)
 
 
 def _order_in_folder(path: Path) -> tuple[int, str]:

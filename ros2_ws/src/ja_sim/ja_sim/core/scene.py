@@ -16,6 +16,7 @@ from typing import Any, get_type_hints
 import yaml
 
 from ja_common.core.config import ConfigError, Configuration, checked, parameter
+from ja_common.core.safe_files import compose_yaml, construct_yaml, read_text
 from ja_sim.core.specs import (
     HEAD_PRESETS,
     CaregiverSpec,
@@ -60,16 +61,13 @@ def load_scene(name_or_path: str) -> Scene:
             )
         path = Path(str(resources.files('ja_sim') / 'scenes' / f'{name_or_path}.yaml'))
     try:
-        root = yaml.compose(path.read_text(encoding='utf-8'), Loader=yaml.SafeLoader)
-    except OSError as error:
-        raise SceneError(f'{path}: cannot be read: {error.strerror}') from None
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise SceneError(f'{path}:{line}: not YAML: {error.problem}') from None
-    reader = _Reader(path)
-    scene = reader.read(Scene, root, Scene(name=path.stem)) if root else Scene(name=path.stem)
-    assert isinstance(scene, Scene)
-    return scene
+        root = compose_yaml(read_text(path), str(path))
+        scene = Scene(name=path.stem)
+        return _Reader(path).read(Scene, root, scene) if root else scene
+    except SceneError:
+        raise
+    except ConfigError as error:
+        raise SceneError(str(error)) from None
 
 
 class _Reader:
@@ -81,7 +79,8 @@ class _Reader:
     def read(self, cls: type, node: yaml.Node, base: Any) -> Any:
         """Read ``base`` (an instance of ``cls``) with the fields that the node names replaced."""
         if not isinstance(node, yaml.MappingNode):
-            raise self._error(node, f'expected a table of settings, found {node.value!r}')
+            found = repr(node.value)[:50] if isinstance(node, yaml.ScalarNode) else 'a list'
+            raise self._error(node, f'expected a table of settings, found {found}')
         types, values = get_type_hints(cls), {}
         known = {item.name: item for item in dataclasses.fields(cls)}
         for key, value in node.value:
@@ -89,7 +88,8 @@ class _Reader:
                 base = self._preset(value)
                 continue
             if key.value not in known:
-                raise self._error(key, f"unknown setting '{key.value}'{_hint(key.value, known)}")
+                name = key.value[:50]
+                raise self._error(key, f"unknown setting '{name}'{_hint(name, known)}")
             values[key.value] = self._value(types[key.value], value, getattr(base, key.value))
             try:
                 if 'description' in known[key.value].metadata:
@@ -106,13 +106,13 @@ class _Reader:
             return self._preset(node)
         if dataclasses.is_dataclass(kind):
             return self.read(kind, node, default)  # type: ignore[arg-type]
-        value = yaml.SafeLoader('').construct_object(node, deep=True)
+        value = construct_yaml(node, str(self._path))
         return tuple(value) if isinstance(value, list) else value
 
     def _preset(self, node: yaml.Node) -> HeadSpec:
-        if node.value not in HEAD_PRESETS:
+        if not isinstance(node, yaml.ScalarNode) or node.value not in HEAD_PRESETS:
             names = ', '.join(HEAD_PRESETS)
-            raise self._error(node, f"no head preset '{node.value}': choose {names}")
+            raise self._error(node, f"no head preset '{str(node.value)[:50]}': choose {names}")
         return HEAD_PRESETS[node.value]
 
     def _error(self, node: yaml.Node, message: str) -> SceneError:
