@@ -357,7 +357,7 @@ def test_a_restored_learner_goes_on_bit_for_bit(learner):
         ),
         (
             lambda s: s.update({'mean.stretch_logits': np.full((3, 9), np.nan, np.float32)}),
-            'not finite',
+            'must hold numbers',
         ),
         (lambda s: s.update({'candidate_counts': np.array([7])}), 'candidates must be'),
         (lambda s: s.update({'evidence.nats': np.zeros(9)}), 'evidence'),
