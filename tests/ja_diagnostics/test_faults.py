@@ -1,11 +1,16 @@
 """Disturbances change the messages as they should, and a bad outcome is not ok."""
 
 import dataclasses
+import http.server
+import threading
 from pathlib import Path
 
 import pytest
 
+from ja_common.core.live_page import LIVE_PAGE
 from ja_diagnostics.faults.disturbance import Disturbance
+from ja_diagnostics.faults.page_attack import PageAttack
+from ja_diagnostics.faults.relay import Relay
 from ja_diagnostics.faults.run import COLUMNS, FaultOutcome, FaultRun
 
 
@@ -57,6 +62,7 @@ def test_outcome_that_is_ok():
         {'resumed_s': None},
         {'lost': (1, 0)},
         {'lost': (0, 2)},
+        {'withstood': False},
     ],
 )
 def test_outcome_that_is_not_ok(change):
@@ -71,3 +77,34 @@ def test_head_stops_and_goes_on_through_every_fault(tmp_path: Path):
     assert run.run(run.faults()) == 0
     assert len(run.outcomes) == len(run.faults())
     assert [outcome for outcome in run.outcomes if not outcome.ok] == []
+
+
+class Admitting(http.server.BaseHTTPRequestHandler):
+    """A page that answers to every name and every site."""
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.send_header('Content-Length', '0')
+        self.end_headers()
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+def test_a_page_that_admits_another_site_is_not_ok(make_bench, tmp_path: Path):
+    relay = make_bench(Relay).node
+    with http.server.ThreadingHTTPServer(('127.0.0.1', 0), Admitting) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        log = tmp_path / 'view.log'
+        log.write_text(f'{LIVE_PAGE}http://127.0.0.1:{server.server_port}\n')
+        attack = PageAttack(log)
+        attack.begin(relay)
+        assert len(attack.not_refused) == 3
+        assert not attack.is_withstood()
+        server.shutdown()
+
+
+def test_a_page_that_is_not_there_is_not_ok(make_bench, tmp_path: Path):
+    attack = PageAttack(tmp_path / 'view.log')
+    attack.begin(make_bench(Relay).node)
+    assert not attack.is_withstood()

@@ -6,9 +6,11 @@ import signal
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 from ja_common.topics import CAMERA_INFO, IMAGE, JOINT_STATES, Topic
 from ja_diagnostics.faults.disturbance import Disturbance
+from ja_diagnostics.faults.page_attack import PageAttack
 from ja_diagnostics.faults.relay import Relay
 
 LASTS_S = 5.0
@@ -41,11 +43,16 @@ def _at_its_time(_: Graph) -> bool:
     return False
 
 
+def _yes() -> bool:
+    return True
+
+
 @dataclass(frozen=True)
 class Fault:
     """A fault. `stops`: does the head have to stop? If not, it has to go on.
 
-    It ends after `lasts_s`, or earlier when it is `over`.
+    It ends after `lasts_s`, or earlier when it is `over`. `withstood` is asked at its end: what
+    else has to hold?
     """
 
     name: str
@@ -54,10 +61,14 @@ class Fault:
     lasts_s: float = LASTS_S
     stops: bool = True
     over: Callable[[Graph], bool] = _at_its_time
+    withstood: Callable[[], bool] = _yes
 
 
-def faults(nodes: list[str]) -> list[Fault]:
-    """Return all faults of a graph with these nodes, each in its own process."""
+def faults(nodes: list[str], page_log: Path) -> list[Fault]:
+    """Return all faults of a graph with these nodes, each in its own process.
+
+    `page_log`: the log of the live page, which runs beside them.
+    """
     return [
         *(fault for node in nodes for fault in (_killed(node), _frozen(node), _hung(node))),
         _disturbed('camera stopped', _CAMERA, _silence),
@@ -67,6 +78,7 @@ def faults(nodes: list[str]) -> list[Fault]:
         _clock_set_back(),
         _disk_full(),
         _two_commanders(),
+        _page_attacked(page_log),
     ]
 
 
@@ -120,6 +132,17 @@ def _two_commanders() -> Fault:
         'two commanders of the head',
         lambda graph: graph.relay.start_commanding(),
         lambda graph: graph.relay.stop_commanding(),
+    )
+
+
+def _page_attacked(log: Path) -> Fault:
+    attack = PageAttack(log)
+    return Fault(
+        'page opened by another site, joint states of wheels',
+        lambda graph: attack.begin(graph.relay),
+        _nothing,
+        stops=False,
+        withstood=attack.is_withstood,
     )
 
 

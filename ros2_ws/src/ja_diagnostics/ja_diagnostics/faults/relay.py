@@ -49,6 +49,10 @@ class Relay(GraphNode):
         for topic in topics:
             self._disturbances[topic] = make()
 
+    def publish_past_disturbances(self, topic: Topic, message: Any) -> None:
+        """Publish a message that is not the head's."""
+        self._publishers_of[topic].publish(message)
+
     def start_commanding(self) -> None:
         """Be another commander of the head, which sends nothing yet: the gate has to hold."""
         self._command_publisher = self.create_topic_publisher(JOINT_COMMANDS)

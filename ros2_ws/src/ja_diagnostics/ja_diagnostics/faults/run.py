@@ -28,6 +28,8 @@ COLUMNS = (
 STOPS_WITHIN_S = 0.2
 GOES_ON_WITHIN_S = 0.5
 PATIENCE_S = 40.0
+_PAGE = NodeSpec('ja_dashboard', 'view')
+_BESIDE = ('scorer', _PAGE.executable)
 _MOVING_RAD_S = 0.3
 _TRIALS_BEFORE = 2
 _LEARNER_REPORTS_S = 3.0
@@ -40,7 +42,7 @@ class FaultOutcome:
     `stopped_s`: where the head has to stop, from the fault to the last command that moved it;
     else the longest time without a decision of the gate on an image. `resumed_s`: from the end of
     the fault to the next decision. `lost`: trials that the gate, and trials that the learner, no
-    longer knows.
+    longer knows. `withstood`: whatever else had to hold held.
     """
 
     fault: str
@@ -48,6 +50,7 @@ class FaultOutcome:
     stopped_s: float
     resumed_s: float | None
     lost: tuple[int, int]
+    withstood: bool = True
 
     @property
     def ok(self) -> bool:
@@ -55,7 +58,7 @@ class FaultOutcome:
         allowed_s = STOPS_WITHIN_S if self.stops else GOES_ON_WITHIN_S
         # A killed process loses the update that it was computing.
         return (
-            self.stopped_s <= allowed_s and self.resumed_s is not None
+            self.withstood and self.stopped_s <= allowed_s and self.resumed_s is not None
             and self.lost[0] <= 0 and self.lost[1] <= 1
         )  # fmt: skip
 
@@ -89,17 +92,19 @@ class FaultRun:
             replace(spec, remappings={**spec.remappings, **AROUND})
             if spec.executable == 'sim'
             else spec
-            for spec in place(with_arguments(sim_graph(), arguments))
+            for spec in place(with_arguments([*sim_graph(), _PAGE], arguments))
         ]
         self._graph: Sequence[NodeSpec] = graph
         supervision = Supervision('restart', HUNG_AFTER_S)
-        self._supervisor = Supervisor(graph, folder / 'log', supervision, report)
+        self._log = folder / 'log'
+        self._supervisor = Supervisor(graph, self._log, supervision, report)
         self._report = report
         self.outcomes: list[FaultOutcome] = []
 
     def faults(self) -> list[Fault]:
-        """Return all faults of this graph; none for the scorer, on which no node depends."""
-        return faults([spec.executable for spec in self._graph if spec.executable != 'scorer'])
+        """Return all faults of this graph; none of nodes on which no other depends."""
+        nodes = [spec.executable for spec in self._graph if spec.executable not in _BESIDE]
+        return faults(nodes, self._log / f'{_PAGE.executable}.log')
 
     def run(self, chosen: Sequence[Fault]) -> int:
         """Run these faults in turn; return the exit code of the graph."""
@@ -148,6 +153,7 @@ class FaultRun:
                 stopped_s if fault.stops else pause_s,
                 resumed_s,
                 (trials - watcher.trials, learned - watcher.learned),
+                fault.withstood(),
             )
         )
 
