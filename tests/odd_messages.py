@@ -11,9 +11,10 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray, Header, String
 
+from ja_common.camera_info_codec import encode_camera_info
 from ja_common.core.detection import Detection, Kind
 from ja_common.detection_codec import encode_detections
-from ja_common.image_codec import encode_camera_info, encode_image
+from ja_common.image_codec import encode_image
 from ja_common.message_types import message_class
 from ja_common.point_cloud_codec import encode_columns
 

@@ -29,6 +29,7 @@ ALLOWED = {
     'ja_recording/recorder_node.py': 'time.time_ns',  # the stamp of a message that brings none
     # The age of a stamp: it can be compared with the clock that stamps, and with no other.
     'ja_control/gate_node.py': 'self.get_clock().now().nanoseconds',
+    'ja_common/graph_node.py': 'self.get_clock().now().nanoseconds',
     'ja_calibration/calibrator.py': 'self.get_clock().now().nanoseconds',
 }
 

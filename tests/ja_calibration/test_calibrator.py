@@ -91,3 +91,15 @@ def test_a_start_near_the_limits_is_refused(make_bench: Callable[..., NodeBench]
 
     bench.wait(refused)
     assert 'within its limits' in str(bench.node.refusal)
+
+
+def test_images_of_a_camera_on_its_side_are_turned(
+    make_bench: Callable[..., NodeBench],
+) -> None:
+    bench = make_bench(Calibrator, publishes=[JOINT_STATES, IMAGE], image_rotation_deg=270)
+
+    def turned() -> bool:
+        publish_now(bench)
+        return bench.node.image_size == (48, 64)
+
+    bench.wait(turned)

@@ -208,6 +208,15 @@ def test_main_ends_quietly_on_a_signal(domain, capfd):
     assert capfd.readouterr().err == ''
 
 
+@pytest.mark.parametrize('domain_id', ['abc', '-1', '233', '1.5'])
+def test_main_refuses_a_domain_that_does_not_exist(monkeypatch, capfd, domain_id):
+    monkeypatch.setenv('ROS_DOMAIN_ID', domain_id)
+    with pytest.raises(SystemExit) as ended:
+        spin_node(Configured, [])
+    assert ended.value.code == 2
+    assert f"ROS_DOMAIN_ID is '{domain_id}'" in capfd.readouterr().err
+
+
 def test_main_ends_quietly_when_stopped_while_the_node_is_made(domain, capfd):
     made = []
 
@@ -216,7 +225,7 @@ def test_main_ends_quietly_when_stopped_while_the_node_is_made(domain, capfd):
         made.append(GraphNode('late'))
         return made[0]
 
-    spin_node(make_node)
+    spin_node(make_node, [])
     assert made, 'no line of the node was interrupted'
     assert not rclpy.ok()
     assert capfd.readouterr().err == ''
@@ -227,14 +236,14 @@ def test_main_does_not_hide_another_fault(domain):
         raise RuntimeError('the wheel came off')
 
     with pytest.raises(RuntimeError, match='wheel'):
-        spin_node(make_node)
+        spin_node(make_node, [])
     assert not rclpy.ok()
 
 
 @pytest.mark.parametrize(
     ('args', 'text'),
     [
-        (['-p', 'gain:=-1.0'], 'gain out of range'),
+        (['-p', 'gain:=-1.0'], 'gain = -1.0 is outside the range from 0.0'),
         (['-p', 'gain:=-1'], 'gain = -1.0 is outside the range from 0.0'),
         (['-p', 'gain:=loud'], "gain = 'loud' is a str; a float is needed"),
         (['--params-file', '/no/such/file.yaml'], '/no/such/file.yaml'),

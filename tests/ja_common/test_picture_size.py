@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from sensor_msgs.msg import CompressedImage
 
+from ja_common.core.image_encodings import ImageError
 from ja_common.core.picture_size import picture_size
-from ja_common.image_codec import ImageError, decode_compressed
+from ja_common.image_codec import decode_compressed
 
 
 def encoded(extension: str, *options: int) -> bytes:

@@ -85,6 +85,64 @@ def test_still_means_both_joints():
     assert posture.is_still(0.21)
 
 
+def test_joints_that_come_at_different_times_and_rates_are_interpolated_one_by_one():
+    kept = PostureHistory()
+    for ms in range(0, 200, 10):
+        kept.record_joint(0, ms * MS, ms / 1000, 1.0)
+    for ms in (5, 105):  # tilt ten times slower, without velocity
+        kept.record_joint(1, ms * MS, -ms / 1000)
+    at = kept.at(57 * MS)
+    assert at.position == pytest.approx((0.057, -0.057))
+    assert at.velocity == pytest.approx((1.0, -0.52))
+    assert kept.at(106 * MS) is None, 'tilt is not known there yet'
+    assert kept.newest.stamp_ns == 105 * MS, 'the older of the two'
+    assert kept.newest.position == pytest.approx((0.105, -0.105))
+
+
+def test_one_joint_alone_is_no_posture():
+    kept = PostureHistory()
+    kept.record_joint(0, 100 * MS, 0.1)
+    assert kept.newest is None
+    assert kept.at(100 * MS) is None
+    assert kept.why_unknown(100 * MS) == ['', 'no position has come']
+    kept.record_joint(1, 50 * MS, 0.2)
+    assert kept.newest.stamp_ns == 50 * MS
+    assert kept.newest.position == pytest.approx((0.1, 0.2))
+
+
+def test_a_clock_set_back_for_one_joint_is_set_back_for_both():
+    kept = history((10_000, 0.5), (10_100, 0.6))
+    kept.record_joint(0, 1_000 * MS, 0.1)
+    assert kept.newest is None
+    kept.record_joint(1, 1_000 * MS, 0.1)
+    assert kept.newest.stamp_ns == 1_000 * MS
+
+
+def test_a_late_message_of_one_joint_leaves_the_other():
+    kept = PostureHistory()
+    for ms in (0, 20, 40):
+        kept.record_joint(0, ms * MS, 0.0)
+    for ms in (0, 40, 20):
+        kept.record_joint(1, ms * MS, ms / 1000)
+    assert kept.at(30 * MS).position == pytest.approx((0.0, 0.03))
+
+
+def test_both_joints_in_one_message_give_what_the_pairs_give_bit_for_bit():
+    """Trials recorded with the first releases are learned from again with the same outcome."""
+    random = np.random.default_rng(5)
+    stamps = np.cumsum(random.integers(1, 30, 200)) * MS
+    positions, velocities = random.normal(size=(2, 200, 2))
+    kept = PostureHistory(horizon_s=100.0)
+    for stamp_ns, position, velocity in zip(stamps.tolist(), positions, velocities, strict=True):
+        kept.record_posture(stamp_ns, position, velocity)
+    for stamp_ns in random.integers(stamps[0] + 1, stamps[-1], 500).tolist():
+        i = int(np.searchsorted(stamps, stamp_ns))
+        share = (stamp_ns - int(stamps[i - 1])) / (int(stamps[i]) - int(stamps[i - 1]))
+        at = kept.at(stamp_ns)
+        for found, rows in ((at.position, positions), (at.velocity, velocities)):
+            assert np.array_equal(found, rows[i - 1] + share * (rows[i] - rows[i - 1]))
+
+
 def given_now(join):
     return [(item, None if p is None else p.stamp_ns // MS) for item, p in join.pop_ready()]
 

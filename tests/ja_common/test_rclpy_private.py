@@ -13,6 +13,7 @@ from rclpy.executors import Executor, SingleThreadedExecutor, TimeoutObject
 from rclpy.guard_condition import GuardCondition
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from std_msgs.msg import Int32
@@ -26,6 +27,7 @@ from ja_common.rclpy_private import (
     UnspunSubscription,
     WaitSet,
     parameter_names,
+    parameter_overrides,
     take_message,
 )
 from ros_testing import spin_until
@@ -66,6 +68,14 @@ def test_parameters_of_a_node_are_known_by_name(node):
     node.declare_parameter('a', 1)
     assert parameter_names(node)[:2] == ['a', 'b']
     assert 'use_sim_time' in parameter_names(node)
+
+
+def test_what_a_node_was_given_is_known_with_its_value(ros_context):
+    given = [Parameter('a', value=1), Parameter('not declared', value='b')]
+    node = Node('node', context=ros_context, parameter_overrides=given)
+    node.declare_parameter('a', 5)
+    assert parameter_overrides(node) == {'a': 1, 'not declared': 'b'}
+    node.destroy_node()
 
 
 def test_step_of_a_spin_has_the_signature_that_we_overwrite():

@@ -1,15 +1,18 @@
 """A node is called with whole sets of one stamp, with the posture, in stamp order."""
 
+import time
 from collections.abc import Callable
 from typing import Any
 
 import pytest
+from sensor_msgs.msg import JointState
 
+from ja_common.core.health import Level
 from ja_common.graph_node import GraphNode
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.synchroniser import StampedSet, Synchroniser
 from ja_common.topics import FACE_DELTA, FIXATION, JOINT_STATES, LM_DELTA, VF_DELTA
-from node_bench import NodeBench, joint_state
+from node_bench import NodeBench, header, joint_state
 
 MS = 1_000_000
 
@@ -116,3 +119,61 @@ def test_a_patient_node_is_called_without_a_posture_after_its_patience(make_benc
     send(bench, FACE_DELTA, 10)
     bench.wait(lambda: bench.node.calls)
     assert bench.node.calls == [('pair', 10, None)]
+
+
+def send_joint(bench: NodeBench, ms: int, name: str, position: float, **more: Any) -> None:
+    before = bench.received(JOINT_STATES)
+    state = JointState(header=header(ms * MS), name=[name], position=[position], **more)
+    bench.publish(JOINT_STATES, state)
+    bench.wait(lambda: bench.received(JOINT_STATES) > before)
+
+
+def test_joints_in_messages_of_their_own_surround_an_image_one_by_one(bench):
+    for name in ('pan', 'left_wheel', 'tilt'):
+        send_joint(bench, 100, name, 0.0)
+    send(bench, FIXATION, 150)
+    send(bench, VF_DELTA, 150)
+    send(bench, FACE_DELTA, 150)
+    send_joint(bench, 200, 'pan', 0.4)
+    send_joint(bench, 200, 'left_wheel', 9.0, velocity=[float('nan')])
+    assert bench.node.calls == [], 'tilt is not known there yet'
+    send_joint(bench, 160, 'tilt', 0.0)
+    assert bench.node.calls == [('pair', 150, 0.2), ('single', 150, 0.2)]
+    assert "'pan'" not in bench.complaint()
+
+
+def test_a_joint_that_stays_away_is_named_and_its_return_is_noticed(bench):
+    def publish_pan_until(condition: Callable[[], object]) -> None:
+        def publish() -> object:
+            send_joint(bench, bench.received(JOINT_STATES), 'head_pan', 0.0)
+            return condition()
+
+        bench.wait(publish)
+
+    publish_pan_until(lambda: "no position of 'pan' and 'tilt'" in bench.complaint())
+    assert "set pan_joint to the name, 'head_pan'? (now 'pan')" in bench.complaint()
+    assert bench.node.health.report(time.monotonic()).level is Level.WARN
+
+    def publish_ours() -> object:
+        send(bench, JOINT_STATES, bench.received(JOINT_STATES), 0.0, 0.0)
+        return "'pan'" not in bench.complaint()
+
+    bench.wait(publish_ours)
+
+
+def test_an_image_that_no_joint_state_belongs_to_names_the_joint(bench):
+    for ms in (1000, 1020):
+        send_joint(bench, ms, 'pan', 0.0)
+        send_joint(bench, ms + 40, 'tilt', 0.0)
+    send(bench, VF_DELTA, 1005)
+    send(bench, FACE_DELTA, 1005)
+    bench.wait_for_complaint("skipped; 'tilt': its oldest position is 0.035 s newer")
+
+
+def test_a_patient_node_says_that_the_joint_states_are_late(make_bench):
+    bench = make_bench(PatientRecorder, publishes=SPOKEN)
+    send(bench, JOINT_STATES, 10, 0.0, 0.0)
+    send(bench, VF_DELTA, 5000)
+    send(bench, FACE_DELTA, 5000)
+    bench.wait_for_complaint("'pan': its newest position is 4.99 s older")
+    assert bench.node.calls == [('pair', 5000, None)]

@@ -10,6 +10,7 @@ import pytest
 import rclpy
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 
@@ -73,8 +74,8 @@ class Graph:
         return command
 
     def answer(self):
-        """Return the command that carries the header of the last image."""
-        wanted = header(self.stamp_ns)
+        """Return the command that carries the stamp of the last image."""
+        wanted = header(self.stamp_ns, '')
         commands = self.bench.messages(JOINT_COMMANDS)
         self.bench.wait(lambda: any(command.header == wanted for command in commands))
         return next(command for command in reversed(commands) if command.header == wanted)
@@ -116,7 +117,7 @@ def graph(make_graph):
 
 def test_complete_set_is_answered_by_one_command_with_the_stamp_of_the_image(graph):
     first = graph.image()
-    assert first.header == header(graph.stamp_ns), 'header of the image, unchanged'
+    assert first.header == header(graph.stamp_ns, ''), 'stamp of the image, unchanged'
     assert list(first.name) == ['pan', 'tilt']
     assert list(first.position) == [0.0, 0.0], 'the first command is where the head stands'
     second = graph.image()
@@ -279,8 +280,15 @@ def test_broken_proposal_is_one_clear_error_and_not_a_command(graph, message, te
 
 
 def test_unknown_joint_is_named(graph):
-    graph.bench.publish_posture(graph.stamp_ns, name=['neck', 'tilt'])
-    graph.bench.wait_for_complaint("/joint_states: no joint ['pan'] in the message; it names")
+    seen = set()
+
+    def is_named():
+        graph.bench.publish_posture(graph.stamp_ns, name=['head_pan', 'tilt'])
+        seen.add(graph.bench.complaint())
+        return any("joint_states: no position of 'pan' for more than 2 s" in text for text in seen)
+
+    graph.bench.wait(is_named)
+    assert any("set pan_joint to the name, 'head_pan'?" in text for text in seen)
     graph.image()
 
 
@@ -422,12 +430,34 @@ def test_limits_of_the_robot_description(make_bench):
     bench.publish(ROBOT_DESCRIPTION, String(data=URDF.format(tilt=-1)))
     bench.wait_for_complaint('/robot_description: the URDF turns tilt about')
     graph.image()
-    assert graph.status()[1]['reason'] == 'robot_description cannot be used'
+    reason = graph.status()[1]['reason']
+    assert reason.startswith('robot_description cannot be used: the URDF turns tilt about')
     bench.publish(ROBOT_DESCRIPTION, String(data=URDF.format(tilt=1)))
     bench.wait(lambda: bench.received(ROBOT_DESCRIPTION) == 2)
     commands = [graph.image({FACE_DELTA: (-2.0, 0.0)}).position[0] for _ in range(6)]
     assert commands[1] - commands[0] == pytest.approx(-0.1), 'the speed of the URDF'
     assert min(commands) == pytest.approx(-0.18)
+    limits = bench.node.health.values['joint limits']
+    assert 'pan_min_rad -0.2 (<limit> of pan)' in limits
+    assert 'tilt_min_rad -0.4 (<limit> of tilt), tilt_max_rad 0.2 (<limit> of tilt)' in limits
+    assert 'max_acceleration_rad_s2 1e+04 (parameter)' in limits
+
+
+def test_a_head_on_a_robot_that_publishes_each_joint_in_a_message_of_its_own(graph):
+    """Also wheels on the same topic, and NaN for the velocity: no complaint, and commands."""
+    commands = []
+    for _ in range(3):
+        graph.stamp_ns += PERIOD_NS
+        graph.set_clock(graph.stamp_ns)
+        for name, position in (('left_wheel', math.nan), ('pan', graph.pan), ('tilt', 0.0)):
+            state = JointState(header=header(graph.stamp_ns), name=[name], position=[position])
+            state.velocity = [math.nan]
+            graph.bench.publish(JOINT_STATES, state)
+        graph.publish_proposals(FACE_RIGHT)
+        commands.append(graph.answer())
+        graph.pan = commands[-1].position[0]
+    assert [command.position[0] for command in commands] == pytest.approx([0.0, -0.2, -0.4])
+    assert graph.bench.complaint() == 'OK'
 
 
 RATE_HZ = 50.0  # of the commands; slow enough for a busy machine

@@ -40,7 +40,7 @@ def test_most_salient_object_and_face_are_each_centred(make):
     assert list(target.name) == list(face.name) == ['pan', 'tilt']
     assert list(target.position) == pytest.approx([-0.25, -0.125])
     assert list(face.position) == pytest.approx([0.1, 0.2])
-    assert target.header == face.header == header(1_500_000_007), 'the header goes unchanged'
+    assert target.header == face.header == header(1_500_000_007, ''), 'the stamp is unchanged'
 
 
 def test_nothing_seen_is_answered_too(make):

@@ -21,12 +21,13 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_srvs.srv import SetBool, Trigger
 
+from ja_common.camera_info_codec import encode_camera_info
 from ja_common.core.config import Configuration, parameter
 from ja_common.core.detection import Detection, Kind
 from ja_common.core.health import Level
 from ja_common.detection_codec import encode_detections
 from ja_common.graph_node import GraphNode
-from ja_common.image_codec import encode_camera_info, encode_image
+from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.point_cloud_codec import encode_columns
 from ja_common.topics import (
@@ -60,7 +61,11 @@ def status(name='', level=DiagnosticStatus.OK, text='', **values):
 
 @pytest.fixture
 def bench(make_bench):
-    bench = make_bench(ViewNode, publishes=ALWAYS)
+    return view_bench(make_bench)
+
+
+def view_bench(make_bench, **parameters):
+    bench = make_bench(ViewNode, publishes=ALWAYS, **parameters)
     for topic in [*WATCHED, SIM_TRUTH]:
         publisher = bench.peer.create_publisher(topic.type, topic.name, topic.publisher_qos)
         bench._publishers[topic.name] = publisher
@@ -143,6 +148,17 @@ def test_an_image_is_shown_with_its_detections(bench):
     assert 0 <= frame.latencies_ms[DETECTIONS.name] < 10_000
 
 
+def test_the_picture_of_a_camera_on_its_side_is_shown_upright(make_bench):
+    bench = view_bench(make_bench, image_rotation_deg=90)
+    watch(bench)
+    show_images(bench, lambda scene: bench.node.frame.picture is not None)
+    picture = bench.node.frame.picture
+    assert picture.image.shape == (320, 240, 3)
+    assert (picture.camera.width, picture.camera.height) == (240, 320)
+    half_view = math.atan(math.tan(math.radians(18)) * 240 / 320)
+    bench.wait(lambda: bench.node.frame.scene.half_view[0] == pytest.approx(half_view))
+
+
 def test_a_picture_without_its_detections_waits_for_them(bench):
     watch(bench)
     head = header(7_000_000_000)
@@ -177,13 +193,11 @@ def test_what_comes_between_the_images_is_shown(bench):
     bench.wait(lambda: bench.node.frame.scene.command == pytest.approx((0.4, 0.1)))
 
 
-WHEELS = JointState(header=header(1), name=['left', 'right'], position=[1.0, 2.0])
 TOO_MANY = {name: np.zeros(5000) for name in ('pan', 'tilt', 'weight')}
 BAD_MESSAGES = {
-    'wheels': (JOINT_STATES, WHEELS),
-    'joints without numbers': (JOINT_STATES, JointState(name=['pan', 'tilt'])),
+    'too few positions': (JOINT_STATES, JointState(name=['pan', 'tilt'], position=[0.0])),
     'joints that are NaN': (JOINT_STATES, joint_state(1, math.nan, 0.0)),
-    'a command to wheels': (JOINT_COMMANDS, WHEELS),
+    'a command that is NaN': (JOINT_COMMANDS, joint_state(1, math.nan, 0.0)),
     'a calibration that is none': (CAMERA_INFO, CameraInfo(k=[-1.0] * 9)),
     'an unknown encoding': (IMAGE, Image(encoding='32FC1', width=1, height=1, step=4)),
     'an image without pixels': (IMAGE, Image(encoding='rgb8')),

@@ -4,15 +4,18 @@ import mmap
 import os
 import shutil
 import socket
+import subprocess
 import sys
 from types import SimpleNamespace
 
 import pytest
 
+from ja_common.middleware import load_middleware
 from ja_diagnostics import doctor, image_stream
 from ja_diagnostics.doctor import (
     check_ports,
     check_python,
+    check_rclpy,
     check_shared_memory,
     check_stale_segments,
     checks,
@@ -33,6 +36,43 @@ def test_the_version_of_python(version, ok, monkeypatch):
     finding = check_python()
     assert finding.ok is ok
     assert ('JA_PYTHON' in finding.fix) is not ok
+
+
+@pytest.fixture
+def missing_middleware(monkeypatch):
+    """Let rcl look for a middleware that is not installed, in the processes that are started."""
+    monkeypatch.setenv('RMW_IMPLEMENTATION', 'rmw_of_another_lab_cpp')
+    load_middleware.cache_clear()
+    yield
+    load_middleware.cache_clear()
+
+
+@pytest.mark.usefixtures('domain', 'missing_middleware')
+def test_a_middleware_that_is_not_installed_is_a_finding_and_not_the_end():
+    finding = check_rclpy()
+    assert not finding.ok
+    assert 'rmw_of_another_lab_cpp' in finding.text
+    assert '/' not in finding.text, 'no places in the source of rcl'
+    assert finding.fix.startswith('unset RMW_IMPLEMENTATION')
+    assert 'rclpy' in doctor.check_discovery().text
+
+
+@pytest.mark.usefixtures('missing_middleware')
+def test_a_command_ends_with_one_sentence_where_the_middleware_is_not_installed():
+    command = [sys.executable, '-m', 'ja_bringup', 'topics']
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 2
+    (line,) = ended.stderr.splitlines()
+    assert line.startswith('error: RMW_IMPLEMENTATION=rmw_of_another_lab_cpp cannot be loaded')
+    assert 'unset RMW_IMPLEMENTATION' in line
+
+
+@pytest.mark.parametrize('domain_id', ['abc', '300', '-1'])
+def test_a_domain_that_does_not_exist_is_a_finding(monkeypatch, domain_id):
+    monkeypatch.setenv('ROS_DOMAIN_ID', domain_id)
+    assert repr(domain_id) in check_ports().text
+    assert not check_ports().ok
+    assert 'see ports' in doctor.check_discovery().fix
 
 
 def test_shared_memory_that_is_not_there(tmp_path):

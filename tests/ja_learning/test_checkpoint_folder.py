@@ -230,6 +230,42 @@ def test_a_full_disk_costs_nothing_that_was_saved(folder, monkeypatch):
     assert same(resumed, good)
 
 
+def test_what_a_reset_forgot_can_be_had_back(folder):
+    before = trained(5)
+    folder.save(before)
+    folder.save_reset(untrained())
+    resumed = untrained(seed=9)
+    folder.resume_into(resumed)
+    assert resumed.trials == 0, 'a restart stays reset'
+    path, _ = folder.go_back(resumed)
+    assert same(resumed, before)
+    assert path.name == 'paper-000001.npz'
+    restarted = untrained(seed=9)
+    folder.resume_into(restarted)
+    assert same(restarted, before), 'a restart goes on from what was brought back'
+
+
+def test_a_reset_removes_nothing_even_where_one_checkpoint_is_kept(tmp_path):
+    folder = CheckpointFolder(tmp_path, CheckpointConfig(checkpoints_kept=1))
+    folder.save(trained(5))
+    folder.save_reset(untrained())
+    assert folder.go_back(learner := untrained()).path
+    assert learner.trials == 5
+    folder.close()
+
+
+def test_going_back_takes_the_newest_where_it_has_trials_or_none_has(folder):
+    assert folder.go_back(untrained()) == Resumed(None, [])
+    folder.save_reset(untrained())
+    newest = folder.save_reset(reset := untrained(seed=3))
+    assert folder.go_back(learner := untrained()).path == newest
+    assert same(learner, reset)
+    folder.save(trained(5))
+    newest = folder.save(trained(8))
+    assert folder.go_back(learner) == Resumed(newest, [])
+    assert learner.trials == 8
+
+
 def test_it_is_saved_every_so_many_trials_and_at_the_end_if_need_be(tmp_path):
     folder = reopened(tmp_path, checkpoint_every_trials=4)
     learner = untrained()

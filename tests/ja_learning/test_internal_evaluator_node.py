@@ -27,7 +27,7 @@ def test_fixation_is_where_the_head_looked_when_the_image_was_taken(bench):
     bench.wait(lambda: bench.received(JOINT_STATES) == 3)
     bench.publish(DETECTIONS, encode_detections(header(150 * MS), [BALL]))
     fixation = bench.next(FIXATION)
-    assert fixation.header == header(150 * MS)
+    assert fixation.header == header(150 * MS, '')
     assert list(fixation.position) == pytest.approx([0.1 - math.atan(0.05), 0.0], abs=1e-6)
 
 
@@ -60,14 +60,14 @@ def test_clock_set_back_is_survived_even_while_an_image_waits(bench):
     for ms in (1_000, 1_100):
         bench.publish_posture(ms * MS)
     bench.publish(DETECTIONS, encode_detections(header(1_050 * MS), [BALL]))
-    assert bench.next(FIXATION).header == header(1_050 * MS)
+    assert bench.next(FIXATION).header == header(1_050 * MS, '')
 
 
 @pytest.mark.parametrize(
     ('message', 'text'),
     [
-        (joint_state(100 * MS, math.nan, 0.0), "position of ['pan', 'tilt'] is not finite"),
-        (joint_state(100 * MS), 'the message names no joints'),
+        (joint_state(100 * MS, math.nan, 0.0), "the position of 'pan' is not finite: nan"),
+        (joint_state(100 * MS, 0.0, 0.0, 0.0), "3 positions for 2 names: that of 'pan'"),
     ],
 )
 def test_broken_joint_state_is_one_clear_error_and_the_node_lives_on(bench, message, text):

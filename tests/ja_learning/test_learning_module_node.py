@@ -83,7 +83,7 @@ class NodeTrials:
     def _send_image(self, stamp_ns, detections, fixation=()):
         self.bench.publish(DETECTIONS, encode_detections(header(stamp_ns), detections))
         answer = self.bench.next(LM_DELTA)
-        assert answer.header == header(stamp_ns)
+        assert answer.header == header(stamp_ns, '')
         self._publish_fixation(stamp_ns, fixation)
         return answer
 
@@ -279,6 +279,21 @@ def test_what_is_forgotten_stays_forgotten(make_trials, tmp_path):
     first.bench.close()
     second = make_trials(checkpoint_folder=str(tmp_path), seed=5)
     assert list(second.send_look().position) == untrained
+
+
+def test_what_was_forgotten_comes_back_on_demand(make_trials, tmp_path):
+    first = make_trials(checkpoint_folder=str(tmp_path), checkpoint_every_trials=0)
+    first.send_trial()
+    learned = list(first.send_look().position)  # and saved by nothing yet
+    first.send_rest(0.0)
+    assert first.bench.call(Trigger, 'reset_learning').success
+    assert list(first.send_look().position) != learned
+    first.send_rest(0.0)
+    assert first.bench.call(Trigger, 'load_checkpoint').message.startswith('1 trials loaded from')
+    assert list(first.send_look().position) == learned
+    first.bench.close()
+    second = make_trials(checkpoint_folder=str(tmp_path), seed=5)
+    assert list(second.send_look().position) == learned, 'after a restart, too'
 
 
 def test_a_damaged_checkpoint_is_reported_and_the_one_before_it_is_used(make_trials, tmp_path):

@@ -6,14 +6,16 @@ import cv2
 import numpy as np
 import pytest
 import rclpy
+from rclpy.executors import ExternalShutdownException
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 
 from ja_common.executor import CachedWaitSetExecutor
 from ja_common.image_codec import decode_image
 from ja_common.time_codec import to_ns, to_time
-from ja_common.topics import CAMERA_INFO, CLOCK, IMAGE
+from ja_common.topics import CAMERA_INFO, CLOCK, DIAGNOSTICS, IMAGE
 from ja_perception.camera_node import CameraNode
+from picture_files import cut, flat, write_film, write_picture
 from ros_testing import spin_until
 
 
@@ -64,3 +66,58 @@ def test_pictures_come_while_the_clock_stands_still_and_after_it_was_set_back(
 def test_source_that_cannot_be_opened_ends_the_node_with_one_sentence(ros_context):
     with pytest.raises(OSError, match="no such file, folder or device: 'nowhere'"):
         camera(ros_context, source='nowhere')
+
+
+def reported(bench, text):
+    """Wait until the node reports a text in its diagnostics; return its status."""
+
+    def find():
+        return [
+            status
+            for message in bench.messages(DIAGNOSTICS)
+            for status in message.status
+            if status.name == '/camera'
+            and text in ' '.join([status.message, *(pair.value for pair in status.values)])
+        ]
+
+    bench.wait(find)
+    return find()[-1]
+
+
+def test_what_a_folder_leaves_out_is_in_the_diagnostics_and_the_node_runs_on(make_bench, tmp_path):
+    write_picture(tmp_path / '1.png', flat((200, 0, 0)))
+    write_picture(tmp_path / '2.png', flat((0, 200, 0)))
+    cut(tmp_path / '2.png')
+    (tmp_path / '._1.png').write_bytes(b'a file of macOS')
+    parameters = {'source': str(tmp_path), 'rate_hz': 50.0, 'still_s': 0.1}
+    bench = make_bench(CameraNode, [], [IMAGE, DIAGNOSTICS], **parameters)
+    bench.next(IMAGE, 20)
+    status = reported(bench, '2.png')
+    assert 'ends early' in status.message
+    values = {pair.key: pair.value for pair in status.values}
+    assert values['source'].startswith('1 of 3 files')
+    assert '._1.png' in values['source']
+    bench.next(IMAGE, 5)
+
+
+def test_a_film_is_published_at_its_own_times_and_1000_a_second_is_bounded(make_bench, tmp_path):
+    film = write_film(tmp_path / 'fast.mp4', [flat((200, 0, 0))] * 40, 1000.0, 'mp4v')
+    parameters = {'source': film, 'highest_rate_hz': 20.0}
+    bench = make_bench(CameraNode, [], [IMAGE, DIAGNOSTICS], **parameters)
+    first = to_ns(bench.next(IMAGE).header.stamp)
+    count = 20
+    last = to_ns(bench.next(IMAGE, count).header.stamp)
+    # Never faster than bounded; slower where this computer is busy.
+    assert (last - first) / 1e9 > 0.9 * count / 20.0
+    assert 'claims 1000 pictures/s' in reported(bench, 'claims').message
+
+
+def test_a_film_without_a_loop_ends_the_node(ros_context, tmp_path):
+    film = write_film(tmp_path / 'clip.avi', [flat((200, 0, 0))] * 3, 50.0)
+    node = camera(ros_context, source=film, loop=False)
+    executor = CachedWaitSetExecutor(context=ros_context)
+    executor.add_node(node)
+    with pytest.raises(ExternalShutdownException):
+        spin_until(executor, lambda: False, 60.0)
+    executor.shutdown()
+    node.destroy_node()

@@ -6,6 +6,7 @@ import pytest
 
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.geometry import directions_of_rays, head_rotation, rays_of_directions
+from ja_common.core.lens import Lens
 from ja_perception.core.ego_motion import expected_image, rotation_homography
 from ja_perception.core.undistortion import distort_mask, undistort_image
 
@@ -60,7 +61,7 @@ def test_every_pixel_comes_from_where_perspective_says(posture_deg):
 
 
 def test_distortion_is_taken_out_and_put_back():
-    camera = CameraModel(160, 120, 150, 150, 79.5, 59.5, (-0.3, 0.05, 0.0, 0.0, 0.0))
+    camera = CameraModel(160, 120, 150, 150, 79.5, 59.5, Lens((-0.3, 0.05, 0.0, 0.0, 0.0)))
     mask = np.zeros((120, 160), np.uint8)
     mask[20:40, 20:50] = 1
     straight = undistort_image(mask, camera)

@@ -9,10 +9,11 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import CompressedImage, Image, JointState
 from std_msgs.msg import Header
 
+from ja_common.camera_info_codec import encode_camera_info
 from ja_common.core.detection import Kind, caregiver_face
 from ja_common.detection_codec import decode_detections
 from ja_common.executor import CachedWaitSetExecutor
-from ja_common.image_codec import decode_image, encode_camera_info, encode_image
+from ja_common.image_codec import decode_image, encode_image
 from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import (
     CAMERA_INFO,
@@ -77,10 +78,10 @@ class Rig:
             )
         )
 
-    def image(self, stamp_ns, picture):
+    def image(self, stamp_ns, picture, focal_px=None):
         header = Header(stamp=to_time(stamp_ns), frame_id='eye')
         height, width = picture.shape[:2]
-        info = encode_camera_info(header, width, height, FOCAL_PX * width / 320)
+        info = encode_camera_info(header, width, height, focal_px or FOCAL_PX * width / 320)
         self.publishers[CAMERA_INFO.name].publish(info)
         self.publishers[IMAGE.name].publish(encode_image(picture, header.stamp, 'eye'))
 
@@ -254,3 +255,79 @@ def test_alpha_changes_while_running(rig):
     rig.joints(PERIOD_NS)
     rig.image(PERIOD_NS, caregiver_and_ball())
     assert [d.kind for d in decode_detections(rig.answer())] == [Kind.FACE]
+
+
+@pytest.mark.parametrize('turns', [1, 2, 3])
+def test_a_camera_that_hangs_turned_gives_the_detections_of_an_upright_one(ros_context, turns):
+    rig = Rig(ros_context, image_rotation_deg=90 * turns)
+    publishers = rig.publishers.values()
+    rig.wait(lambda: all(p.get_subscription_count() for p in publishers))
+    rig.joints(PERIOD_NS)
+    rig.image(PERIOD_NS, np.ascontiguousarray(np.rot90(caregiver_and_ball(), turns)), FOCAL_PX)
+    message = rig.answer()
+    face, ball = decode_detections(message)
+    rig.close()
+    assert face.attended
+    assert (ball.u, ball.v) == pytest.approx((280, 60), abs=1)
+    assert ball.ray == pytest.approx((120.5 / FOCAL_PX, -59.5 / FOCAL_PX), abs=0.003)
+    assert message.header.frame_id == 'eye_upright'
+
+
+def test_rays_of_a_fisheye_are_those_of_opencv(rig):
+    rig.joints(PERIOD_NS)
+    header = Header(stamp=to_time(PERIOD_NS))
+    info = encode_camera_info(header, 320, 240, 130.0)
+    info.distortion_model, info.d = 'equidistant', [0.02, -0.01, 0.003, 0.001]
+    rig.publishers[CAMERA_INFO.name].publish(info)
+    rig.publishers[IMAGE.name].publish(encode_image(caregiver_and_ball(), header.stamp, 'eye'))
+    ball = decode_detections(rig.answer())[-1]
+    pixel = np.array([[[ball.u, ball.v]]])
+    expected = cv2.fisheye.undistortPoints(pixel, np.reshape(info.k, (3, 3)), np.array(info.d))
+    assert ball.ray == pytest.approx(expected.ravel(), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ('changes', 'reason'),
+    [
+        (dict(distortion_model='omnidirectional', d=[0.1] * 4), "'omnidirectional' is not known"),
+        (dict(d=[0.1] * 3), 'D holds 3 numbers'),
+        (dict(d=[float('nan')] * 5), 'not finite'),
+    ],
+)
+def test_a_calibration_that_cannot_be_obeyed_is_named(rig, changes, reason):
+    info = encode_camera_info(Header(), 320, 240, FOCAL_PX)
+    for name, value in changes.items():
+        setattr(info, name, value)
+    rig.publishers[CAMERA_INFO.name].publish(info)
+    status = rig.diagnosis(reason)
+    assert status.level == b'\x02'
+    assert 'camera_info: ' in status.message
+
+
+def test_a_calibration_for_another_shape_is_refused_and_not_stretched(rig):
+    rig.joints(PERIOD_NS)
+    header = Header(stamp=to_time(PERIOD_NS))
+    rig.publishers[CAMERA_INFO.name].publish(encode_camera_info(header, 320, 180, FOCAL_PX))
+    rig.publishers[IMAGE.name].publish(encode_image(room(), header.stamp, 'eye'))
+    text = rig.diagnosis('another shape').message
+    assert 'the images are 320x240, but camera_info is for 320x180' in text
+
+
+def test_pictures_that_show_nothing_are_reported(rig, monkeypatch):
+    monkeypatch.setattr('ja_common.core.picture_watch._BLIND_AFTER_S', 0.0)
+    rig.joints(PERIOD_NS)
+    rig.image(PERIOD_NS, np.full((240, 320, 3), 3, np.uint8))
+    status = rig.diagnosis('nearly black')
+    assert status.level == b'\x01'
+    assert 'lens covered' in status.message
+
+
+def test_dark_samples_of_12_bits_are_seen(rig):
+    rig.joints(PERIOD_NS)
+    info = encode_camera_info(Header(), 320, 240, FOCAL_PX)
+    rig.publishers[CAMERA_INFO.name].publish(info)
+    wide = np.ascontiguousarray(caregiver_and_ball()[..., ::-1]).astype('<u2') << 4
+    message = Image(width=320, height=240, encoding='bgr16', step=1920, data=wide.tobytes())
+    message.header.stamp = to_time(PERIOD_NS)
+    rig.publishers[IMAGE.name].publish(message)
+    assert [d.kind for d in decode_detections(rig.answer())] == [Kind.FACE, Kind.OBJECT]

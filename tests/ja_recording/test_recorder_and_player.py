@@ -4,6 +4,7 @@ import re
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 from diagnostic_msgs.msg import KeyValue
@@ -12,6 +13,7 @@ from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float32
 
+from foreign_bags import FLOAT, RATES, write_db3, write_mcap
 from ja_common.core.config import ConfigError
 from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import (
@@ -26,7 +28,8 @@ from ja_common.topics import (
 from ja_recording.core.reader import Recording
 from ja_recording.player_node import PlayerNode
 from ja_recording.recorder_node import RecorderNode
-from recordings import T0_NS, write_recording
+from ja_recording.recording_folder import Limits, RecordingFolder
+from recordings import T0_NS, channel_of, write_recording
 
 ALWAYS_PUBLISHED = '^/(rosout|parameter_events|diagnostics)$'
 
@@ -146,3 +149,76 @@ def test_a_topic_that_is_not_there_cannot_be_left_out(make_bench, tmp_path):
     path = write_recording(tmp_path / 'r', rates(1, 1))
     with pytest.raises(ConfigError, match='no topic /other in the recording'):
         make_bench(PlayerNode, recording=str(path), without='other')
+
+
+def values(bench) -> list[float]:
+    """Return what came on a latched topic; of a burst, only the last message is sure to come."""
+    return [message.data for message in bench.messages(SUCCESS_RATE)]
+
+
+def logged(capfd) -> str:
+    return capfd.readouterr().err
+
+
+@pytest.mark.parametrize('write', [write_mcap, write_db3])
+def test_a_type_that_is_not_installed_blocks_no_other(write, make_bench, tmp_path, capfd):
+    """The other topics are played, and the message names the topic, its type, and what to do."""
+    unknown = ('/lidar', 'velodyne_msgs/msg/VelodyneScan', 'cdr')
+    service = ('/set/_service_event', 'std_srvs/srv/SetBool_Event', 'cdr')
+    topics = [('/sim/success_rate', FLOAT, 'cdr'), unknown, service]
+    path = write(tmp_path / ('x.mcap' if write is write_mcap else 'x.db3'), topics)
+    parameters = {'recording': str(path), 'start_after_s': 0.2}
+    bench = make_bench(PlayerNode, subscribes=[SUCCESS_RATE], **parameters)
+    bench.wait(lambda: bench.node.done and 5.0 in values(bench))
+    assert bench.node.played == len(RATES)
+    said = logged(capfd)
+    assert said.count('/lidar is left out') == 1
+    assert 'ros-jazzy-velodyne-msgs' in said
+    assert '--without /lidar' in said
+    assert '/set/_service_event is left out' in said
+
+
+def test_what_is_left_out_is_not_looked_up(make_bench, tmp_path, capfd):
+    topics = [
+        ('/sim/success_rate', FLOAT, 'cdr'),
+        ('/a', 'x_msgs/msg/X', 'cdr'),
+        ('/b', '', 'json'),
+    ]
+    path = write_mcap(tmp_path / 'x.mcap', topics)
+    bench = make_bench(PlayerNode, recording=str(path), without='/a,b', start_after_s=0.0)
+    bench.wait(lambda: bench.node.done)
+    assert 'left out' not in logged(capfd)
+
+
+def test_a_recording_of_unknown_types_alone_is_refused(make_bench, tmp_path):
+    path = write_mcap(tmp_path / 'x.mcap', [('/a', 'x_msgs/msg/X', 'cdr')])
+    with pytest.raises(ConfigError, match='no topic of it can be published'):
+        make_bench(PlayerNode, recording=str(path))
+
+
+def test_a_gap_of_years_is_skipped_and_named(make_bench, tmp_path, capfd):
+    """Recorded with --use-sim-time: time 0 until the first /clock."""
+    path = write_mcap(
+        tmp_path / 'x.mcap', [('/sim/success_rate', FLOAT, 'cdr')],
+        stamps_ns=(0, 0, T0_NS, T0_NS + 10**8), data=RATES,
+    )  # fmt: skip
+    bench = make_bench(
+        PlayerNode, subscribes=[SUCCESS_RATE, CLOCK], recording=str(path), start_after_s=0.2
+    )
+    bench.wait(lambda: bench.node.done and 3.0 in values(bench))
+    assert bench.node.length_s == pytest.approx(0.1)
+    assert 'The clock of the recorder was set' in logged(capfd)
+    clock = [to_ns(message.clock) for message in bench.messages(CLOCK)]
+    assert clock == sorted(clock)
+    assert clock[-1] < T0_NS + 10**10
+
+
+def test_a_quality_of_service_that_cannot_be_read_blocks_no_topic(make_bench, tmp_path, capfd):
+    folder = RecordingFolder(tmp_path / 'r', Limits())
+    channel = replace(channel_of(SUCCESS_RATE), offered_qos='- what: is this')
+    folder.write_message(channel, RATES[0], T0_NS, T0_NS, 0)
+    folder.close()
+    bench = make_bench(PlayerNode, recording=str(tmp_path / 'r'), start_after_s=0.2)
+    bench.wait(lambda: bench.node.done)
+    assert bench.node.played == 1
+    assert 'quality of service of /sim/success_rate cannot be read' in logged(capfd)

@@ -1,13 +1,15 @@
 """The progress node collects the state of a graph, and the display shows it."""
 
 import io
+import math
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rich.console import Console
 
-from ja_common.topics import DIAGNOSTICS, GATE_STATUS, SCORE
+from ja_common.topics import DIAGNOSTICS, FIXATION, GATE_STATUS, SCORE
 from ja_runner.progress import Display, ProgressNode
+from node_bench import joint_state
 
 
 def status(level: bytes = DiagnosticStatus.OK, name: str = '', text: str = '', **values: str):
@@ -17,9 +19,10 @@ def status(level: bytes = DiagnosticStatus.OK, name: str = '', text: str = '', *
 
 def test_it_counts_trials_and_keeps_the_gates_state(make_bench):
     bench = make_bench(ProgressNode, publishes=[GATE_STATUS, SCORE])
+    assert math.isnan(bench.node.began_s)
     assert bench.node.elapsed_s == 0
     bench.publish(GATE_STATUS, status(phase='shift', source='LM', p_lm='0.25', trials='7'))
-    bench.wait(lambda: bench.node.images == 1)
+    bench.wait(lambda: bench.node.gate)
     for last in ('success', 'failure', 'given up'):
         bench.publish(SCORE, status(last=last, objects='3'))
     bench.wait(lambda: len(bench.node.curve.records) == 3)
@@ -30,6 +33,16 @@ def test_it_counts_trials_and_keeps_the_gates_state(make_bench):
     assert facts['phase'] == 'shift'
     assert facts['success rate, recent'].startswith('0.33 [')
     assert bench.node.elapsed_s > 0
+
+
+def test_an_image_is_counted_once_whatever_the_gate_publishes(make_bench):
+    bench = make_bench(ProgressNode, publishes=[GATE_STATUS, FIXATION])
+    for stamp_ns in (1, 2, 2, 3):  # one was sent again
+        bench.publish(FIXATION, joint_state(stamp_ns))
+    for _ in range(9):  # in real time the gate reports ten times a second
+        bench.publish(GATE_STATUS, status(phase='shift'))
+    bench.wait(lambda: bench.received(GATE_STATUS) == 9 and bench.received(FIXATION) == 4)
+    assert bench.node.images == 3
 
 
 def test_a_warning_is_shown_until_it_is_over(make_bench):

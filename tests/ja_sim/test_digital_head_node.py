@@ -6,9 +6,10 @@ import rclpy
 from sensor_msgs.msg import JointState
 
 from ja_common.executor import CachedWaitSetExecutor
-from ja_common.image_codec import encode_image
+from ja_common.image_codec import decode_image, encode_image
 from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import CAMERA_INFO, IMAGE, JOINT_COMMANDS, JOINT_STATES, WIDE_IMAGE
+from ja_sim.core.digital_head import DigitalHead
 from ja_sim.digital_head_node import DigitalHeadNode
 from ros_testing import spin_until
 
@@ -57,3 +58,17 @@ def test_obeys_commands_and_speaks_with_the_stamp_of_the_wide_picture(ros_contex
     executor.shutdown()
     head.destroy_node()
     rig.destroy_node()
+
+
+@pytest.mark.parametrize('degrees', [0, 90, 180, 270])
+def test_the_window_is_mounted_as_the_wide_camera_is(make_bench, degrees):
+    wide = np.random.default_rng(0).integers(0, 256, (480, 640, 3), np.uint8)
+    delivered = np.ascontiguousarray(np.rot90(wide, degrees // 90))
+    topics = [IMAGE, CAMERA_INFO]
+    bench = make_bench(DigitalHeadNode, [WIDE_IMAGE], topics, image_rotation_deg=degrees)
+    bench.publish(WIDE_IMAGE, encode_image(delivered, to_time(SECOND), 'wide'))
+    bench.wait(lambda: all(bench.messages(topic) for topic in topics))
+    image, info = (bench.messages(topic)[0] for topic in topics)
+    upright, _ = DigitalHead().render_view(wide, SECOND)
+    assert np.array_equal(np.rot90(decode_image(image), -degrees // 90), upright)
+    assert (info.width, info.height) == (image.width, image.height)

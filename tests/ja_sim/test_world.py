@@ -11,6 +11,7 @@ import pytest
 
 from ja_common.core.config import ConfigError
 from ja_common.core.geometry import angle_between, rays_of_directions
+from ja_perception.core.haar import read_cascade
 from ja_sim.core import graphics
 from ja_sim.core.caregiver import SKIN_TONES, identities
 from ja_sim.core.graphics import RenderError
@@ -321,10 +322,7 @@ def test_an_unknown_identity_is_refused_with_the_known_ones():
 @pytest.mark.parametrize('turn_deg', [0.0, 40.0, -60.0])
 def test_a_face_detector_finds_her(make_world, turn_deg):
     """OpenCV's frontal and profile cascades were not trained on rendered faces."""
-    cascades = [
-        cv2.CascadeClassifier(cv2.data.haarcascades + f'haarcascade_{name}.xml')
-        for name in ('frontalface_alt2', 'profileface')
-    ]
+    cascades = [read_cascade(name) for name in ('frontalface_alt2', 'profileface')]
     found = 0
     for name in identities()[:4]:
         world = make_world(scene(caregiver={'identity': name}), size=(320, 240))

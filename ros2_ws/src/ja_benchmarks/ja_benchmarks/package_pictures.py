@@ -42,10 +42,10 @@ def package_file(package: str, name: str) -> Path:
 def package_picture(package: str, name: str) -> NDArray[np.uint8]:
     """Read a picture of a package, uint8 (H, W, 3) RGB. Raises PicturesMissingError."""
     path = package_file(package, name)
-    picture = cv2.imread(str(path), cv2.IMREAD_COLOR_RGB)
+    picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if picture is None:
         raise PicturesMissingError(f'{path} is no readable picture')
-    return picture.astype(np.uint8, copy=False)
+    return cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
 
 
 def package_folder(requirement: str) -> Path:

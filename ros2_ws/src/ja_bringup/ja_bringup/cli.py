@@ -18,6 +18,7 @@ from ja_bringup.commands import (
 from ja_bringup.examples import add_examples
 from ja_common.core.config import ConfigError
 from ja_common.core.home_folder import replace_missing_home
+from ja_common.middleware import check_middleware
 from ja_common.python_command import protect_children
 from ja_common.ros_arguments import split_ros_arguments
 from ja_common.ros_defaults import apply_ros_defaults
@@ -31,6 +32,8 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
+
+_FITTING_VERSIONS = 'those of requirements/*.lock, or of requirements/ubuntu-24.04.txt'
 
 # In the order of the help page.
 _GROUPS = (
@@ -48,6 +51,8 @@ def main() -> None:
     apply_ros_defaults()
     with clean_end():
         ours, ros = split_ros_arguments(sys.argv[1:])
+        if ours[:1] != ['doctor']:  # which says more
+            check_middleware()
         try:
             app(args=ours, obj=ros, prog_name='ja')
         except ModuleNotFoundError as error:
@@ -55,6 +60,13 @@ def main() -> None:
             if package not in PART_OF:
                 raise
             raise ConfigError(missing_part(package)) from None
+        except ImportError as error:
+            # One library refuses another, as pyarrow 26 does with NumPy 1; ours are not meant.
+            if (error.name or '').startswith('ja_'):
+                raise
+            raise ConfigError(
+                f'{error}; install versions that fit together: {_FITTING_VERSIONS}'
+            ) from None
 
 
 if __name__ == '__main__':

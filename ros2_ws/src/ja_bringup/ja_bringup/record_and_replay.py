@@ -1,7 +1,7 @@
 """`./ja record` and `./ja replay`: run one node, with its progress on the terminal."""
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from rclpy.context import Context
@@ -9,7 +9,6 @@ from rclpy.node import Node
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from ja_common.ros_arguments import check_ros_arguments
-from ja_recording.core.reader import Recording, warn_of_unfinished
 from ja_runner.node_spec import NodeSpec
 from ja_runner.one_process import run_in_one_process
 
@@ -43,21 +42,19 @@ def record(parameters: Mapping[str, Any], time_s: float, arguments: Sequence[str
 
 def replay(parameters: Mapping[str, Any], arguments: Sequence[str]) -> int:
     """Play a recording to its end; return the exit code."""
-    warn_of_unfinished(Recording(Path(parameters['recording'])))
     spec = NodeSpec('ja_recording', 'player', parameters, arguments=arguments)
     columns = (
         TextColumn('{task.completed:.0f} of {task.total:.0f} s'), BarColumn(),
         TimeRemainingColumn(),
     )  # fmt: skip
     with Progress(*columns) as progress:
-        task = progress.add_task('')
+        task = progress.add_task('', visible=False)  # until there is something to show
         nodes: list[Any] = []
 
         def done() -> bool:
             [node] = nodes
-            length_s = 1e-9 * (node.recording.last_ns - node.recording.first_ns)
-            position_s = min(max(node.position_s, 0.0), length_s)
-            progress.update(task, total=length_s, completed=position_s)
+            position_s = min(max(node.position_s, 0.0), node.length_s)
+            progress.update(task, total=node.length_s, completed=position_s, visible=True)
             return node.done
 
         code = _run(spec, nodes, done)
@@ -75,4 +72,4 @@ def _run(spec: NodeSpec, nodes: list[Any], done: Callable[[], bool]) -> int:
         nodes.append(make(context=context, cli_args=arguments, use_global_arguments=False))
         return nodes[0]
 
-    return run_in_one_process([], make_node, done)
+    return run_in_one_process([], make_node, done, lambda text: print(text, file=sys.stderr))

@@ -15,20 +15,26 @@ from rich.table import Table
 from ja_common.core.files import check_file_writable, check_writable
 from ja_common.ros_arguments import check_ros_arguments
 from ja_recording.core.dataset import TrialSample, write_dataset
-from ja_recording.core.reader import Recording, warn_of_unfinished
+from ja_recording.core.reader import Recording, print_remarks
 from ja_recording.learner_score import ScoredTrial, score_learner, success_rate, write_csv
 from ja_recording.trials import RecordedTrial, recorded_trials
 
 _BLOCK_TRIALS = 50
 
 
-def score(path: Path, csv_file: Path | None, as_json: bool, arguments: Sequence[str]) -> int:
+def score(
+    path: Path,
+    without: Sequence[str],
+    csv_file: Path | None,
+    as_json: bool,
+    arguments: Sequence[str],
+) -> int:
     """Train a learner on the trials of a recording, print its curve; return the exit code."""
     check_ros_arguments(arguments)
     if csv_file is not None:
         check_file_writable(csv_file)
-    recording = Recording(path)
-    warn_of_unfinished(recording)
+    recording = Recording(path, without)
+    print_remarks(recording)
     with _bar(recording, path.name) as advance:
         trials = score_learner(recording, arguments, advance)
     if as_json:
@@ -62,7 +68,7 @@ def export(paths: Sequence[Path], folder: Path, licence: str, arguments: Sequenc
 
     def samples() -> Iterator[TrialSample]:
         for path, recording in recordings.items():
-            warn_of_unfinished(recording)
+            print_remarks(recording)
             with _bar(recording, path.name) as advance:
                 for trial in recorded_trials(recording, arguments, advance):
                     yield sample_of(trial, path.resolve().name)

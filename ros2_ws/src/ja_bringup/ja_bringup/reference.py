@@ -19,6 +19,7 @@ from rosgraph_msgs.msg import Clock
 
 from ja_bringup.sros_policy import policy_xml
 from ja_common.core.files import check_writable, write_file
+from ja_common.core.parameter_page import OF_EVERY_NODE, PAGE
 from ja_common.graph_node import GraphNode
 from ja_common.parameters import UNBOUNDED
 from ja_common.private_context import private_context
@@ -52,8 +53,6 @@ _SHOWN_FOR_PLACEHOLDER = {
     'recording': '(must be given)',
     'folder': "''",
 }
-# Parameters that rclpy itself declares on every node.
-_NOT_OURS = ('use_sim_time', 'start_type_description_service')
 
 _TOPICS_HEAD = """# Topics and services
 
@@ -89,6 +88,12 @@ def write_reference(folder: Path) -> list[Path]:
     for name, text in pages.items():
         write_file(folder / name, text)
     return [folder / name for name in pages]
+
+
+def copy_into_package(folder: Path) -> Path:
+    """Copy the page of parameters to where the nodes read it (`core.parameter_page`)."""
+    write_file(PAGE, (folder / 'parameters.md').read_text())
+    return PAGE
 
 
 @contextmanager
@@ -157,7 +162,7 @@ def parameters_page(nodes: list[GraphNode]) -> str:
         head = f'\n## {node.get_name()}\n\n| parameter | default | range | what it is |\n'
         rows = []
         for name in parameter_names(node):
-            if name.startswith(_NOT_OURS) or name.startswith('qos_overrides'):
+            if name.startswith(OF_EVERY_NODE) or name.startswith('qos_overrides'):
                 continue
             descriptor = node.describe_parameter(name)
             shown = _default(node, name)

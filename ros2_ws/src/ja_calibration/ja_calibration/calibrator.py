@@ -13,11 +13,11 @@ from std_msgs.msg import Header
 
 from ja_calibration.core.calibration_moves import CalibrationConfig, calibration_moves
 from ja_calibration.core.calibration_sequence import CalibrationSequence
+from ja_common.camera_input import CameraInput, CameraInputConfig
 from ja_common.core.config import Configuration, parameter
 from ja_common.core.posture import Posture
 from ja_common.core.stamps import NS_PER_S
 from ja_common.graph_node import GraphNode
-from ja_common.image_codec import decode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.synchroniser import StampedSet, Synchroniser
 from ja_common.time_codec import to_ns
@@ -52,6 +52,9 @@ class Calibrator(GraphNode):
         self.last_hold = ''
         self.image_size = (0, 0)
         self.joints = JointCodec(self.configure(JointConfig))
+        self._camera = CameraInput(
+            self.configure(CameraInputConfig), self.resolve_topic_name(IMAGE.name)
+        )
         self._config = self.configure(CalibrationConfig)
         self._limits = self.configure(JointLimitsConfig)
         period_s = 1.0 / self.configure(CalibratorConfig).control_rate_hz
@@ -84,7 +87,7 @@ class Calibrator(GraphNode):
         self._guard.record_image(time.monotonic(), self._age_s(stamp_ns))
         if self.sequence is None or not self.sequence.needs_images:
             return None
-        grey = cv2.cvtColor(decode_image(message), cv2.COLOR_RGB2GRAY)
+        grey = cv2.cvtColor(self._camera.decode(message), cv2.COLOR_RGB2GRAY)
         self.image_size = (grey.shape[1], grey.shape[0])
         return grey
 

@@ -2,7 +2,7 @@
 
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar
@@ -10,19 +10,28 @@ from typing import Any, TypeVar
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 
-from ja_common.core.config import Configuration
+from ja_common.core.config import ConfigError, Configuration
 from ja_common.core.health import Health, Level
+from ja_common.core.parameter_page import project_parameters
+from ja_common.core.parameter_sections import parameter_sections
+from ja_common.core.unread_parameters import unread_parameters
 from ja_common.discovery_refresher import DiscoveryRefresher
 from ja_common.parameters import declare_config
-from ja_common.topics import DIAGNOSTICS, Topic
+from ja_common.rclpy_private import parameter_names, parameter_overrides
+from ja_common.silence import why_silent
+from ja_common.stamp_watch import watch_stamps
+from ja_common.topics import CLOCK, DIAGNOSTICS, Topic
 
 Config = TypeVar('Config', bound=Configuration)
+
+# So many reports, one a second, may /clock be missing while a graph starts.
+_CLOCK_PATIENCE = 3
 
 
 class GraphNode(Node):
@@ -33,6 +42,12 @@ class GraphNode(Node):
     /diagnostics, and the node runs on.
     """
 
+    refuses_unknown_parameters = False
+    """Whether the node must not start with a parameter that reaches nothing (`check_parameters`).
+
+    True where a misspelt name would leave a motor with a default in place of a safe value.
+    """
+
     def __init__(self, name: str, **node_kwargs: Any) -> None:
         super().__init__(name, **node_kwargs)
         self.health = Health(time.monotonic())
@@ -40,6 +55,8 @@ class GraphNode(Node):
         self.subscribed_topics: dict[str, Topic] = {}
         self.published_topics: dict[str, Topic] = {}
         self.advertised_services: dict[str, Any] = {}
+        self._unread_parameters: list[str] = []
+        self._reports_without_clock = 0
         self._diagnostics = self.create_topic_publisher(DIAGNOSTICS)
         self._discovery_refresher = DiscoveryRefresher(self)
         # Wall time, not /clock: a simulation that stands still must be reported as well.
@@ -50,6 +67,29 @@ class GraphNode(Node):
     ) -> Config:
         """Declare a configuration dataclass as this node's parameters; see `declare_config`."""
         return declare_config(self, config_class, changed)
+
+    def check_parameters(self, arguments: Sequence[str]) -> None:
+        """Report parameters that this node was given and does not have; call it once it is made.
+
+        `arguments`: its ROS arguments, without `--ros-args`. Raises ConfigError instead, where the
+        class has `refuses_unknown_parameters` and they are not for nodes of others.
+        """
+        unread = list(
+            unread_parameters(
+                self.get_fully_qualified_name(),
+                parameter_names(self),
+                parameter_overrides(self),
+                parameter_sections(arguments),
+                project_parameters(),
+            )
+        )
+        for parameter in unread:
+            if parameter.is_foreign:
+                self.get_logger().warning(parameter.sentence)
+        self._unread_parameters = [each.sentence for each in unread if not each.is_foreign]
+        if self._unread_parameters and self.refuses_unknown_parameters:
+            raise ConfigError('; '.join(self._unread_parameters))
+        self._report_unread_parameters()
 
     def create_topic_publisher(self, topic: Topic) -> Publisher:
         """Create a publisher of a topic."""
@@ -72,9 +112,10 @@ class GraphNode(Node):
 
         def receive(message: Any) -> None:
             self.health.record_message(resolved, time.monotonic())
+            check_stamp(message)
             callback(message)
 
-        # Default event callbacks cost a third of the throughput; `_why_silent` explains instead.
+        # Default event callbacks cost a third of the throughput; `why_silent` explains instead.
         subscription = self.create_subscription(
             topic.type,
             topic.name,
@@ -84,6 +125,13 @@ class GraphNode(Node):
         )
         resolved = subscription.topic_name
         self.subscribed_topics[resolved] = topic
+        check_stamp = watch_stamps(
+            topic,
+            lambda: None if self._in_lockstep() else self.get_clock().now().nanoseconds,
+            lambda text: self.report_problem(
+                f'stamps of {resolved}', f'{resolved}: {text}', Level.WARN
+            ),
+        )
         self.health.watch_input(resolved, expected_every_s)
 
     def create_subscription(
@@ -158,22 +206,50 @@ class GraphNode(Node):
             callback(*args)
         except (ValueError, OSError) as error:
             self.report_problem(where, f'{where}: {error}')
+        except ExternalShutdownException:
+            raise  # the node ends itself, as the camera at the end of a film
         except Exception as error:
             # No bad input but a bug: the node runs on, and the trace is logged.
             text = f'{where}: {type(error).__name__}: {error}\n{traceback.format_exc()}'
             self.report_problem(where, text)
 
+    def _in_lockstep(self) -> bool:
+        """Return whether the time of this node is that of the images, whatever its clock says."""
+        return self.has_parameter('lockstep') and self.get_parameter('lockstep').value
+
+    def _report_unread_parameters(self) -> None:
+        for sentence in self._unread_parameters:
+            self.report_problem(sentence, sentence, Level.WARN)
+
+    def _report_missing_clock(self) -> None:
+        """Report that the time of this node stands still because nothing publishes it."""
+        simulated = self.get_parameter('use_sim_time').value
+        alone = simulated and not self.count_publishers(CLOCK.name)
+        # Nodes of a graph start one after the other.
+        self._reports_without_clock = self._reports_without_clock + 1 if alone else 0
+        if self._reports_without_clock > _CLOCK_PATIENCE:
+            text = (
+                f'use_sim_time is true, and no node publishes {CLOCK.name}: start the simulator '
+                'or player that does, or set use_sim_time:=false'
+            )
+            self.report_problem('simulated time', text, Level.WARN)
+        elif not alone:
+            self.health.clear_problem('simulated time')
+
     def _report(self) -> None:
+        self._report_unread_parameters()
         if halted_s := self._discovery_refresher.refresh(time.monotonic()):
             self.report_problem('halt', f'this node stood still for {halted_s:.1f} s', Level.WARN)
+        self._report_missing_clock()
         now_s = time.monotonic()
         silent = self.health.silent_inputs(now_s)
         for name in self.subscribed_topics:
             where = f'silence of {name}'
             if name in silent:
-                text = f'no message on {name} for more than {silent[name]:g} s: '
+                why = why_silent(self, name, self.subscribed_topics[name])
+                text = f'no message on {name} for more than {silent[name]:g} s: {why}'
                 quiet = self.health.is_starting(name, now_s)
-                self.report_problem(where, text + self._why_silent(name), Level.WARN, quiet)
+                self.report_problem(where, text, Level.WARN, quiet)
             else:
                 self.health.clear_problem(where)
         report = self.health.report(now_s)
@@ -187,24 +263,3 @@ class GraphNode(Node):
         array = DiagnosticArray(status=[status])
         array.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(array)
-
-    def _why_silent(self, name: str) -> str:
-        publishers = self.get_publishers_info_by_topic(name)
-        if not publishers:
-            return 'no node publishes it'
-        needed = self.subscribed_topics[name].subscriber_qos
-        for publisher in publishers:
-            offered = publisher.qos_profile
-            if (
-                needed.reliability is ReliabilityPolicy.RELIABLE
-                and offered.reliability is ReliabilityPolicy.BEST_EFFORT
-            ) or (
-                needed.durability is DurabilityPolicy.TRANSIENT_LOCAL
-                and offered.durability is DurabilityPolicy.VOLATILE
-            ):
-                return (
-                    f'{publisher.node_name} publishes it with a quality of service that does not '
-                    f'match: {offered.reliability.name} {offered.durability.name} is offered, '
-                    f'{needed.reliability.name} {needed.durability.name} is needed'
-                )
-        return f'{publishers[0].node_name} is its publisher, but sends nothing'

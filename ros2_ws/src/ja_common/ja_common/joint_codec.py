@@ -1,5 +1,6 @@
 """JointState on the wire: postures, changes of posture, and empty messages (no names)."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
-from ja_common.core.config import Configuration, parameter
+from ja_common.core.config import ConfigError, Configuration, parameter
 
 
 @dataclass(frozen=True)
@@ -25,12 +26,18 @@ class JointConfig(Configuration):
         0.0, "what the rig's tilt joint reads when the head looks level", low=-6.3, high=6.3
     )
 
+    def check_together(self) -> None:
+        """Raise ConfigError when the two joints are not told apart by their names."""
+        if self.pan_joint == self.tilt_joint:
+            raise ConfigError(f'pan_joint and tilt_joint are both {self.pan_joint!r}')
+
 
 class JointCodec:
     """Between (pan, tilt) in REP-103 axes and JointState in the rig's own names and signs.
 
     `encode` and `decode` are for changes and directions, `encode_posture` and `decode_posture` for
-    measured and commanded joint angles: rig angle = sign * angle + offset.
+    commanded joint angles: rig angle = sign * angle + offset. `decode_joint` is for joint states,
+    which a rig may send for each joint separately, or for a whole robot (`PostureReader`).
     """
 
     def __init__(self, config: JointConfig) -> None:
@@ -44,7 +51,8 @@ class JointCodec:
         self, header: Header, angles: ArrayLike | None, velocity: ArrayLike | None = None
     ) -> JointState:
         """Return a message for angles (2,) [rad], velocity (2,) [rad/s]; empty for angles None."""
-        message = JointState(header=header)
+        # Angles of joints are in no frame: the image's, that they follow from, would mislead.
+        message = JointState(header=Header(stamp=header.stamp))
         if angles is not None:
             message.name = self.names
             message.position = self._to_rig(angles)
@@ -59,7 +67,7 @@ class JointCodec:
         """
         if not message.name:
             return None
-        return self._from_rig(message, message.position, 'position')
+        return self._from_rig(message)
 
     def encode_posture(
         self, header: Header, posture: ArrayLike, velocity: ArrayLike | None = None
@@ -70,31 +78,63 @@ class JointCodec:
         return message
 
     def decode_posture(self, message: JointState) -> NDArray[np.float64] | None:
-        """Return the measured or commanded posture (2,) [rad]; None and errors as `decode`."""
+        """Return the commanded posture (2,) [rad]; None and errors as `decode`."""
         angles = self.decode(message)
         return None if angles is None else angles - self.signs * self.offsets
 
-    def decode_velocity(self, message: JointState) -> NDArray[np.float64] | None:
-        """Return the velocity (2,) [rad/s], or None where the message gives none.
+    def decode_joint(self, message: JointState, joint: int) -> tuple[float, float | None] | None:
+        """Return what a message of a whole robot states of one joint, 0 pan or 1 tilt.
 
-        joint_state_broadcaster of ros2_control sends NaN where the hardware measures none.
+        That is its position [rad] and its velocity [rad/s]; None for a message that states no
+        position of it. A velocity that is absent or of no use (joint_state_broadcaster sends NaN
+        where the hardware measures none) is None. Raises ValueError for a position that is not
+        finite, or that cannot be attributed to the joint.
         """
-        if np.isnan(message.velocity).all():
+        name, names, positions = self.names[joint], message.name, message.position
+        if name not in names or not len(positions):
             return None
-        return self._from_rig(message, message.velocity, 'velocity')
+        if len(positions) != len(names):
+            raise ValueError(
+                f'{len(positions)} positions for {len(names)} names: that of {name!r} is unknown'
+            )
+        index, sign = names.index(name), float(self.signs[joint])
+        stated = positions[index]
+        if names.count(name) > 1:
+            every = [positions[i] for i, other in enumerate(names) if other == name]
+            if every.count(stated) != len(every):
+                raise ValueError(f'{name!r} is named {len(every)} times, with positions {every}')
+        if not math.isfinite(stated):
+            raise ValueError(f'the position of {name!r} is not finite: {stated}')
+        position = sign * stated - sign * float(self.offsets[joint])
+        velocities = message.velocity
+        if len(velocities) != len(names) or not math.isfinite(velocities[index]):
+            return position, None
+        return position, sign * velocities[index]
+
+    def decode_command(self, message: JointState, last: ArrayLike) -> NDArray[np.float64]:
+        """Return the posture (2,) [rad] that a command asks for.
+
+        A joint that the command does not state keeps its value of `last` (2,) [rad]. Errors as
+        `decode_joint`.
+        """
+        posture = np.array(last, float)
+        for joint in range(len(posture)):
+            if (stated := self.decode_joint(message, joint)) is not None:
+                posture[joint] = stated[0]
+        return posture
 
     def _to_rig(self, values: ArrayLike) -> list[float]:
         return (self.signs * np.asarray(values, float)).tolist()
 
-    def _from_rig(self, message: JointState, values: ArrayLike, what: str) -> NDArray[np.float64]:
+    def _from_rig(self, message: JointState) -> NDArray[np.float64]:
         names = list(message.name)
         lacking = [name for name in self.names if name not in names]
         if lacking:
             raise ValueError(f'no joint {lacking} in the message; it names {names}')
-        values = np.asarray(values, float)
+        values = np.asarray(message.position, float)
         if len(values) != len(names):
-            raise ValueError(f'{len(values)} numbers in {what} for {len(names)} names')
+            raise ValueError(f'{len(values)} numbers in position for {len(names)} names')
         angles = self.signs * values[[names.index(name) for name in self.names]]
         if not np.isfinite(angles).all():
-            raise ValueError(f'{what} of {self.names} is not finite: {angles.tolist()}')
+            raise ValueError(f'position of {self.names} is not finite: {angles.tolist()}')
         return angles

@@ -92,3 +92,8 @@ def _inner_types(type_name: str) -> list[str]:
         if other or name[0].isupper():  # built-in types are in small letters
             inner.append(f'{other[0] if other else package}/msg/{name}')
     return inner
+
+
+def type_name_of(message_type: Any) -> str:
+    """Return the name of a message's class, as the ROS graph has it: `package/msg/Name`."""
+    return f'{message_type.__module__.partition(".")[0]}/msg/{message_type.__name__}'

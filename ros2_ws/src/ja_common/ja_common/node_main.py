@@ -4,6 +4,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 import rclpy
 from rclpy.clock import Clock, ClockType
@@ -14,7 +15,10 @@ from rclpy.signals import SignalHandlerOptions
 from ja_common.core.config import ConfigError
 from ja_common.core.home_folder import replace_missing_home
 from ja_common.executor import CachedWaitSetExecutor
+from ja_common.graph_node import GraphNode
 from ja_common.heartbeat import PERIOD_S, heartbeat
+from ja_common.node_usage import node_usage
+from ja_common.ros_arguments import domain_id, rcl_sentence, split_ros_arguments
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_common.stop_signals import StopSignals, end_process
 
@@ -26,11 +30,19 @@ def spin_node(make_node: Callable[[], Node], args: Sequence[str] | None = None) 
     """Run a node as the `main` of its process, until SIGINT, SIGTERM or SIGHUP.
 
     A second signal ends the process at once. Exits with code 2 and one sentence for a
-    configuration that cannot be used.
+    configuration that cannot be used. With `--help` it prints the usage, and makes no node.
     """
     replace_missing_home()
     apply_ros_defaults()
+    ours, _ = split_ros_arguments(_arguments(args))
+    if {'--help', '-h'} & set(ours):
+        with suppress(BrokenPipeError):  # `gate --help | head`
+            print(node_usage(make_node.__module__), flush=True)
+        return
     try:
+        if ours:
+            raise ConfigError(f'unknown: {" ".join(ours)}; parameters: --ros-args -p NAME:=VALUE')
+        domain_id()
         with StopSignals() as stop:
             _run(make_node, args, stop)
     except (ConfigError, OSError) as error:
@@ -45,6 +57,7 @@ def _run(make_node: Callable[[], Node], args: Sequence[str] | None, stop: StopSi
     node = None
     try:
         node = make_node()
+        check_parameters(node, split_ros_arguments(_arguments(args))[1])
         made.set()
         _start_heartbeat(node)
         executor = CachedWaitSetExecutor()
@@ -59,6 +72,16 @@ def _run(make_node: Callable[[], Node], args: Sequence[str] | None, stop: StopSi
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
+
+
+def check_parameters(node: Node, arguments: Sequence[str]) -> None:
+    """Let a node of ours report what it was given and does not have (`GraphNode`)."""
+    if isinstance(node, GraphNode):
+        node.check_parameters(arguments)
+
+
+def _arguments(args: Sequence[str] | None) -> Sequence[str]:
+    return sys.argv[1:] if args is None else args
 
 
 def _start_heartbeat(node: Node) -> None:
@@ -81,4 +104,4 @@ def _init(args: Sequence[str] | None) -> None:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         # An unknown argument, or a parameter file that is missing or no YAML.
-        raise ConfigError(f'ROS arguments cannot be used: {error}') from None
+        raise ConfigError(f'ROS arguments cannot be used: {rcl_sentence(error)}') from None

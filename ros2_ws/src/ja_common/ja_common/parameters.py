@@ -14,7 +14,8 @@ from rclpy.exceptions import InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from ja_common.core.config import ConfigError, Configuration
+from ja_common.core.config import ConfigError, Configuration, checked
+from ja_common.rclpy_private import parameter_overrides
 
 Config = TypeVar('Config', bound=Configuration)
 
@@ -33,16 +34,20 @@ def declare_config(
 
     With `changed` the parameters may be set while the node runs: a bad value is refused with the
     reason and changes nothing, a good one gives `changed` the new configuration. Without it they
-    are read-only. A whole number is accepted for a float. Raises ConfigError for a bad override.
+    are read-only. A whole number is accepted for a float, at the start and later, and becomes a
+    float for all who read the parameter. Raises ConfigError for a bad override.
     """
     config_fields = {f.name: f for f in fields(config_class)}  # type: ignore[arg-type]
+    overrides = parameter_overrides(node)
     values = {}
     try:
         for name, config_field in config_fields.items():
-            declared = node.declare_parameter(
-                name, config_field.default, _descriptor(config_field, read_only=changed is None)
-            )
-            values[name] = declared.value
+            descriptor = _descriptor(config_field, read_only=changed is None)
+            given = overrides.get(name)
+            # Checked here, so that a whole number is declared as a float, and stays one.
+            value = config_field.default if given is None else checked(config_field, given)
+            node.declare_parameter(name, value, descriptor, ignore_override=True)
+            values[name] = value
         config = config_class(**values)
     except (ConfigError, InvalidParameterValueException) as error:
         raise ConfigError(f'{node.get_fully_qualified_name()}: parameters: {error}') from None
@@ -54,6 +59,9 @@ def declare_config(
     def updated(parameters: list[Parameter]) -> Config:
         ours = [p for p in parameters if p.name in config_fields]
         return replace(current, **{p.name: p.value for p in ours})  # type: ignore[type-var]
+
+    def as_floats(parameters: list[Parameter]) -> list[Parameter]:
+        return [_as_float(p) if p.name in floats else p for p in parameters]
 
     def validate(parameters: list[Parameter]) -> SetParametersResult:
         try:
@@ -68,9 +76,17 @@ def declare_config(
             current = updated(parameters)
             changed(current)
 
+    floats = {name for name, each in config_fields.items() if isinstance(each.default, float)}
+    node.add_pre_set_parameters_callback(as_floats)
     node.add_on_set_parameters_callback(validate)
     node.add_post_set_parameters_callback(apply)
     return config
+
+
+def _as_float(parameter: Parameter) -> Parameter:
+    if parameter.type_ is not Parameter.Type.INTEGER:
+        return parameter
+    return Parameter(parameter.name, value=float(parameter.value))
 
 
 def choices_of(descriptor: ParameterDescriptor) -> tuple[str, ...]:

@@ -32,6 +32,11 @@ def parameter_names(node: Node) -> list[str]:
     return sorted(node._parameters)
 
 
+def parameter_overrides(node: Node) -> dict[str, Any]:
+    """Return the parameters that a node was given at its start, declared or not, with values."""
+    return {name: given.value for name, given in node._parameter_overrides.items()}
+
+
 class StepExecutor(SingleThreadedExecutor):
     """rclpy's executor without its waiting: a subclass waits and serves in `spin_step`."""
 

@@ -10,12 +10,14 @@ from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
+from ja_common.core.health import Level
 from ja_common.core.patient_queue import PatientQueue
 from ja_common.core.posture import Posture, PostureHistory, PostureJoin
 from ja_common.core.stamp_join import StampJoin
 from ja_common.core.stamp_ordered_dispatcher import StampOrderedDispatcher
 from ja_common.graph_node import GraphNode
 from ja_common.joint_codec import JointCodec
+from ja_common.posture_reader import PostureReader
 from ja_common.time_codec import to_ns
 from ja_common.topics import JOINT_STATES, Topic
 
@@ -75,16 +77,19 @@ class Synchroniser:
     ) -> None:
         """`joints`: decodes the joint states; None: the callbacks need no posture."""
         self._node = node
-        self._joints = joints
+        self._postures: PostureReader | None = None
         self._is_calibrated = is_calibrated
         self._history = PostureHistory()
-        self._strict: PostureJoin[tuple[Callback, StampedSet]] = PostureJoin(self._history)
         self._patient: PatientQueue[tuple[Callback, StampedSet]] | None = None
         self._joins: list[StampJoin] = []
         self._callbacks: list[Callback] = []
         self._dispatcher: StampOrderedDispatcher | None = None  # one set needs no order
         if joints is not None:
-            node.subscribe(JOINT_STATES, self._on_joint_states, joints_expected_every_s)
+            self._postures = PostureReader(joints, joints_expected_every_s)
+            self._history = self._postures.history
+            receive = partial(self._on_joint_states, self._postures)
+            node.subscribe(JOINT_STATES, receive, joints_expected_every_s)
+        self._strict: PostureJoin[tuple[Callback, StampedSet]] = PostureJoin(self._history)
         if patience_s is not None:
             self._patient = PatientQueue(self._history, patience_s)
             # Steady time: this is for the case that the other messages do not come.
@@ -93,7 +98,7 @@ class Synchroniser:
 
     @property
     def newest_posture(self) -> Posture | None:
-        """Return the latest measured posture: for holding the head, not for an image."""
+        """Return the latest posture of which both joints are measured: to hold the head there."""
         return self._history.newest
 
     @property
@@ -157,7 +162,7 @@ class Synchroniser:
             self._node.subscribe(topic, partial(collect, topic, decode))
 
     def _queue(self, index: int, found: StampedSet) -> None:
-        if self._joints is None:
+        if self._postures is None:
             self._dispatch(index, found)
             return
         item = (partial(self._dispatch, index), found)
@@ -180,20 +185,34 @@ class Synchroniser:
             for (call, found), _, posture in self._patient.pop_ready(
                 self._is_calibrated(), time.monotonic()
             ):
+                if posture is None:
+                    self._report_late_joints(found.stamp_ns)
                 call(replace(found, posture_or_none=posture))
             return
         for (call, found), posture in self._strict.pop_ready():
             if posture is None:
                 text = 'no joint state for the stamp of an image: skipped'
-                self._node.report_problem('posture', text)
+                self._node.report_problem(
+                    'posture', f'{text}; {self._why_unknown(found.stamp_ns)}'
+                )
             else:
                 call(replace(found, posture_or_none=posture))
 
-    def _on_joint_states(self, message: JointState) -> None:
-        assert self._joints is not None
-        position = self._joints.decode_posture(message)
-        if position is None:
-            raise ValueError('the message names no joints')
-        velocity = self._joints.decode_velocity(message)
-        self._history.record_posture(to_ns(message.header.stamp), position, velocity)
+    def _why_unknown(self, stamp_ns: int) -> str:
+        return '' if self._postures is None else self._postures.explain_unknown(stamp_ns)
+
+    def _report_late_joints(self, stamp_ns: int) -> None:
+        """Report an image that went on without a posture although joint states come."""
+        newest_ns = self._history.newest_stamp_ns
+        if newest_ns is not None and newest_ns < stamp_ns:
+            text = 'an image did not wait longer for the joint states of its time'
+            why = self._why_unknown(stamp_ns)
+            self._node.report_problem('posture', f'{text}; {why}', Level.WARN)
+
+    def _on_joint_states(self, postures: PostureReader, message: JointState) -> None:
+        now_s = time.monotonic()
+        try:
+            postures.record_message(message, now_s)
+        finally:
+            postures.report_joints(self._node, now_s)
         self.call_ready()

@@ -12,7 +12,8 @@ from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, Trigger
 
 from ja_common.core.config import ConfigError, Configuration, parameter
-from ja_common.core.posture import REORDERED_WITHIN_S, Posture
+from ja_common.core.joint_track import REORDERED_WITHIN_S
+from ja_common.core.posture import Posture
 from ja_common.core.stamps import NS_PER_S
 from ja_common.graph_node import GraphNode
 from ja_common.joint_codec import JointCodec, JointConfig
@@ -43,7 +44,8 @@ from ja_control.core.gating import Gating, GatingConfig
 from ja_control.core.hold import Cause, Hold
 from ja_control.core.joint_limits import JointLimitsConfig
 from ja_control.core.trial_count import load_trials, save_trials
-from ja_control.core.urdf_limits import narrow_limits, read_joint
+from ja_control.core.urdf_joint import read_joint
+from ja_control.core.urdf_limits import narrow_limits
 from ja_control.gate_status import encode_gate_status
 
 _PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, GLANCE_DELTA, FIXATION)
@@ -85,6 +87,8 @@ class GateNode(GraphNode):
     In real time a steady timer steps the guard. A command carries the header of the image that it
     follows, or the time of the clock while the head is held.
     """
+
+    refuses_unknown_parameters = True
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('gate', **node_kwargs)
@@ -170,15 +174,23 @@ class GateNode(GraphNode):
     def _on_robot_description(self, message: String) -> None:
         self._urdf = message.data
         self._guard.blocked = f'{ROBOT_DESCRIPTION.name} cannot be used'
-        self._narrow_limits()
+        try:
+            self._narrow_limits()
+        except ValueError as error:
+            self._guard.blocked += f': {error}'
+            raise
         self._guard.blocked = ''
 
     def _narrow_limits(self) -> None:
         pan, tilt = (read_joint(self._urdf, name) for name in self._joints.names)
         joints = self._joints
-        self._guard.set_limits(
-            narrow_limits(self._limits, pan, tilt, joints.signs, joints.offsets)
-        )
+        narrowed = narrow_limits(self._limits, pan, tilt, joints.signs, joints.offsets)
+        self._guard.set_limits(narrowed.config)
+        texts = {'joint limits': narrowed.sources, 'robot description': '; '.join(narrowed.notes)}
+        for key, text in texts.items():
+            if text != self.health.values.get(key, ''):
+                self.get_logger().info(f'{key}: {text}')
+            self.health.values[key] = text
 
     def _act(self, found: StampedSet) -> None:
         """Decide on an image with all its proposals, and command the head in lockstep."""

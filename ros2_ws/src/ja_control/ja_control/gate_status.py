@@ -42,5 +42,6 @@ def encode_gate_status(
         level=bytes([level]),
         name=name,
         message=message,
+        hardware_id=name.rpartition('/')[0] or '/',  # the namespace: one head each
         values=[KeyValue(key=key, value=value) for key, value in values.items()],
     )

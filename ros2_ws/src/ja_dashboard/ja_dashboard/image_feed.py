@@ -1,6 +1,7 @@
 """Images with their detections, polled from the graph while the page has a viewer."""
 
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,18 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 
+from ja_common.camera_input import CameraInput, CameraInputConfig
 from ja_common.core.annotate import annotate_image
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.detection import Detection
 from ja_common.core.fixation import WIDTH_SIXTH
 from ja_common.core.geometry import directions_of_rays
-from ja_common.core.posture import PostureHistory
 from ja_common.detection_codec import decode_detections
 from ja_common.graph_node import GraphNode
-from ja_common.image_codec import decode_camera_info, decode_image
+from ja_common.image_codec import decode_image
 from ja_common.joint_codec import JointCodec
 from ja_common.point_cloud_codec import decode_columns
 from ja_common.polled_subscription import PolledSubscription
+from ja_common.posture_reader import PostureReader
 from ja_common.time_codec import to_ns
 from ja_common.topics import (
     BELIEF,
@@ -84,17 +86,20 @@ class ImageFeed:
     A message that cannot be shown is a problem of the node; all others are shown.
     """
 
-    def __init__(self, node: GraphNode, model: ViewModel, joints: JointCodec) -> None:
+    def __init__(
+        self, node: GraphNode, model: ViewModel, joints: JointCodec, camera: CameraInputConfig
+    ) -> None:
         self._node = node
         self._model = model
         self._joints = joints
         self.subscriptions = {
             topic: PolledSubscription(node, topic, depth) for topic, depth in _DEPTHS.items()
         }
-        self._postures = PostureHistory()
+        self._postures = PostureReader(joints)
         self._pending: tuple[int, Any] | None = None
         self._sent_ns: dict[int, int] = {}
-        self._calibration: CameraInfo | None = None
+        self._camera = CameraInput(camera, node.resolve_topic_name(IMAGE.name))
+        self._last_command = np.full(2, np.nan)
         self._command: NDArray[np.float64] | None = None
         self._belief = np.zeros((0, 3))
         self._truth: TruthView | None = None
@@ -155,16 +160,19 @@ class ImageFeed:
                     self.latencies_ms[topic.name] = (sent_ns - image_ns) / 1e6
 
     def _on_camera_info(self, message: CameraInfo) -> None:
-        decode_camera_info(message, 1, 1)  # raises ValueError: the last good calibration stays
-        self._calibration = message
+        self._camera.record_camera_info(message)
 
     def _on_joint_state(self, message: JointState) -> None:
-        if (posture := self._joints.decode_posture(message)) is not None:
-            self._postures.record_posture(to_ns(message.header.stamp), posture)
+        now_s = time.monotonic()
+        try:
+            self._postures.record_message(message, now_s)
+        finally:
+            self._postures.report_joints(self._node, now_s)
 
     def _on_command(self, message: JointState) -> None:
-        if (posture := self._joints.decode_posture(message)) is not None:
-            self._command = posture
+        self._last_command = self._joints.decode_command(message, self._last_command)
+        if np.isfinite(self._last_command).all():  # each joint has been commanded
+            self._command = self._last_command
 
     def _on_belief(self, message: PointCloud2) -> None:
         columns = _shown_columns(message, ('pan', 'tilt', 'weight'))
@@ -197,18 +205,17 @@ class ImageFeed:
                 )
 
     def _show(self, stamp_ns: int, message: Any, found: PointCloud2, face: Any) -> None:
-        image = _shown_image(message)
+        _check_size(message)
+        image = self._camera.decode(message)
         detections: list[Detection] = self._decoded(DETECTIONS, _shown_detections, found) or []
         face_image = None if face is None else self._decoded(FACE_IMAGE, _shown_image, face)
-        camera = self._camera(image)
+        camera = self._camera_of(image)
         latency_s = self.latencies_ms.get(DETECTIONS.name, 0.0) / 1e3
-        sample = self._postures.at(stamp_ns) or self._postures.newest
+        sample = self._postures.history.at(stamp_ns) or self._postures.history.newest
         posture = None if sample is None else sample.position
         rays = np.array([detection.ray for detection in detections]).reshape(-1, 2)
         self.scene = SceneView(
-            half_view=(
-                math.atan(camera.width / 2 / camera.fx), math.atan(camera.height / 2 / camera.fy)
-            ),
+            half_view=camera.half_view_rad,
             low=self.limits[0],
             high=self.limits[1],
             posture=posture,
@@ -224,20 +231,24 @@ class ImageFeed:
         self._node.call_guarded(topic.name, lambda: decoded.append(decode(message)))
         return decoded[0] if decoded else None
 
-    def _camera(self, image: NDArray[np.uint8]) -> CameraModel:
+    def _camera_of(self, image: NDArray[np.uint8]) -> CameraModel:
         height, width = image.shape[:2]
-        camera = decode_camera_info(self._calibration, width, height)
+        camera = self._camera.camera(image)
         return camera or CameraModel.from_field_of_view(width, height, _ASSUMED_VIEW_RAD)
 
 
 def _shown_image(message: Image) -> NDArray[np.uint8]:
-    """Decode an image that a JPEG can hold and a browser can show."""
+    _check_size(message)
+    return decode_image(message)
+
+
+def _check_size(message: Image) -> None:
+    """Raise ValueError for an image that no JPEG can hold and no browser can show."""
     if max(message.width, message.height) > _MOST_PX:
         raise ValueError(
             f'an image of {message.width}x{message.height} is too large for the page, which shows '
             f'up to {_MOST_PX} pixels a side'
         )
-    return decode_image(message)
 
 
 def _shown_detections(message: PointCloud2) -> list[Detection]:

@@ -20,6 +20,7 @@ from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
+from ja_common.camera_input import CameraInputConfig
 from ja_common.core.config import Configuration, parameter
 from ja_common.core.health import Level
 from ja_common.core.live_page import LIVE_PAGE
@@ -95,6 +96,7 @@ class ViewNode(GraphNode):
         super().__init__('view', **node_kwargs)
         self.config = self.configure(ViewConfig)
         self._joints = JointCodec(self.configure(JointConfig))
+        self._camera = self.configure(CameraInputConfig)
         self._model = ViewModel(time.monotonic())
         self._feed: ImageFeed | None = None
         self._requests: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
@@ -182,7 +184,7 @@ class ViewNode(GraphNode):
         has_viewer = now_s - self._viewer_s < _VIEWER_STAYS_S
         if has_viewer and self._feed is None:
             self._model.reset_silence(now_s)
-            self._feed = ImageFeed(self, self._model, self._joints)
+            self._feed = ImageFeed(self, self._model, self._joints, self._camera)
             self._ask_parameters()
         elif not has_viewer and self._feed is not None:
             self._feed.close()

@@ -14,8 +14,10 @@ from pathlib import Path
 
 import psutil
 
+from ja_common.core.config import ConfigError
+from ja_common.middleware import TESTED, load_middleware
 from ja_common.python_command import code_command, module_command
-from ja_diagnostics import image_stream
+from ja_common.ros_arguments import SAFE_DOMAIN_ID, domain_id
 from ja_runner.image_transport import (
     ENOUGH_SHARED_MB,
     SHARED_MEMORY,
@@ -71,16 +73,17 @@ def check_python() -> Finding:
 
 def check_rclpy() -> Finding:
     """Check that rclpy can be imported, and that its middleware is Fast DDS."""
-    try:
-        import rclpy
-
-        middleware = rclpy.get_rmw_implementation_identifier()
-    except Exception as error:
+    found = load_middleware()
+    wanted = os.environ.get('RMW_IMPLEMENTATION')
+    if found.error and wanted and wanted != TESTED:
+        fix = f'unset RMW_IMPLEMENTATION (it is {wanted}), or install it for this ROS'
+        return Finding('rclpy', False, found.error, fix)
+    if found.error:
         fix = 'delete .venv and run ./ja again; with ROS sourced, use the Python it is made for'
-        return Finding('rclpy', False, f'{type(error).__name__}: {error}', fix)
-    ok = middleware == 'rmw_fastrtps_cpp'
+        return Finding('rclpy', False, found.error, fix)
+    ok = found.name == TESTED
     fix = '' if ok else 'unset RMW_IMPLEMENTATION: only Fast DDS is tested'
-    return Finding('rclpy', ok, f'{Path(rclpy.__file__).parent}, {middleware}', fix)
+    return Finding('rclpy', ok, f'{Path(found.rclpy).parent}, {found.name}', fix)
 
 
 def check_shared_memory(folder: Path = SHARED_MEMORY) -> Finding:
@@ -116,10 +119,16 @@ def check_stale_segments(folder: Path = SHARED_MEMORY) -> Finding:
 
 def check_ports() -> Finding:
     """Check the ROS_DOMAIN_ID, and whether its first UDP port is free."""
-    domain = int(os.environ.get('ROS_DOMAIN_ID') or 0)
+    try:
+        domain = domain_id()
+    except ConfigError as error:
+        return Finding('ports', False, str(error), f'export ROS_DOMAIN_ID=0 (to {SAFE_DOMAIN_ID})')
     port = 7400 + 250 * domain + 10  # unicast discovery of the first participant (DDSI-RTPS)
-    if not 0 <= domain <= 101:
-        fix = 'choose ROS_DOMAIN_ID from 0 to 101: above, the ports collide with the system'
+    if domain > SAFE_DOMAIN_ID:
+        fix = (
+            f'choose ROS_DOMAIN_ID from 0 to {SAFE_DOMAIN_ID}: above, the ports collide with the '
+            'system'
+        )
         return Finding('ports', False, f'domain {domain}', fix)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as test:
         try:
@@ -136,6 +145,15 @@ def check_ports() -> Finding:
 
 def check_discovery() -> Finding:
     """Send images from one process to another, and count those that arrive."""
+    if load_middleware().error:
+        return Finding('discovery', False, 'not checked: rclpy cannot be imported', 'see rclpy')
+    try:
+        domain_id()
+    except ConfigError:
+        return Finding('discovery', False, 'not checked: there is no such domain', 'see ports')
+    # Imported here, because it imports rclpy, and without a middleware that ends this process.
+    from ja_diagnostics import image_stream
+
     command = module_command(image_stream.__name__)
     receiver = subprocess.Popen(
         [*command, image_stream.RECEIVE],

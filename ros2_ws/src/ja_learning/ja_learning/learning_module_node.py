@@ -155,7 +155,8 @@ class LearningModuleNode(GraphNode):
         pan, tilt = directions.T
         weight = np.full(len(directions), 1 / max(len(directions), 1))
         columns = {'pan': pan, 'tilt': tilt, 'weight': weight}
-        self._belief.publish(encode_columns(header, columns))
+        # Angles of joints are in no frame.
+        self._belief.publish(encode_columns(Header(stamp=header.stamp), columns))
 
     def _take_fixation(self, found: StampedSet) -> None:
         direction = found[FIXATION]

@@ -13,7 +13,7 @@ from ja_common.core.health import Level
 from ja_common.graph_node import GraphNode
 from ja_common.realtime import use_default_scheduling
 from ja_learning.core.background_learner import BackgroundLearner
-from ja_learning.core.checkpoint_folder import CheckpointConfig, CheckpointFolder
+from ja_learning.core.checkpoint_folder import CheckpointConfig, CheckpointFolder, Resumed
 from ja_learning.core.learner import Learner, Predictor
 from ja_learning.core.trial import Trial
 
@@ -66,14 +66,15 @@ class PersistentLearner:
         self._background.update(trial)
 
     def reset(self) -> None:
-        """Forget everything, in the newest checkpoint too."""
-        self._replace(self._make())
+        """Forget everything, in the newest checkpoint too; `load_checkpoint` can go back."""
+        forgotten = self._replace(self._make())
         if self._checkpoints is None:
             return
-        self._background.call_with_learner(self._save)
+        self._try(self._checkpoints.save_when_changed, forgotten)
+        self._background.call_with_learner(self._save_reset)
         if self._unsaved:
             text = f'a restart would bring back what was forgotten: {self._unsaved}'
-            self._node.report_problem('saving', text)
+            self._node.report_problem('reset', text)
 
     def report_health(self) -> None:
         """Put the progress of learning, and its errors, into the node's health."""
@@ -111,9 +112,11 @@ class PersistentLearner:
         # An update is not urgent, even where answers are (`realtime_priority`).
         return BackgroundLearner(learner, self._after_update, self._behind, use_default_scheduling)
 
-    def _replace(self, learner: Learner) -> None:
-        self._background.close(0.0)
+    def _replace(self, learner: Learner) -> Learner:
+        """Continue with another learner; return the one before."""
+        before = self._background.close(0.0)
         self._background = self._in_background(learner)
+        return before
 
     def _after_update(self, learner: Learner) -> None:
         """Run in the thread that learns."""
@@ -124,6 +127,9 @@ class PersistentLearner:
 
     def _save(self, learner: Learner) -> None:
         self._try(self._kept_in().save, learner)
+
+    def _save_reset(self, learner: Learner) -> None:
+        self._try(self._kept_in().save_reset, learner)
 
     def _try(self, save: Callable[[Learner], object], learner: Learner) -> None:
         """Save, or keep why that failed; run in the thread that learns while there is one."""
@@ -151,7 +157,10 @@ class PersistentLearner:
         return self._checkpoints
 
     def _resume(self, learner: Learner) -> Path | None:
-        path, refused = self._kept_in().resume_into(learner)
+        return self._report_resumed(learner, self._kept_in().resume_into(learner))
+
+    def _report_resumed(self, learner: Learner, resumed: Resumed) -> Path | None:
+        path, refused = resumed
         for text in refused:
             self._node.report_problem('checkpoints', f'refused: {text}', Level.WARN)
         if path is not None:
@@ -166,7 +175,7 @@ class PersistentLearner:
 
     def _on_load(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         learner = self._make()
-        path = self._resume(learner)
+        path = self._report_resumed(learner, self._kept_in().go_back(learner))
         if path is None:
             raise ValueError(f'no checkpoint in {self._kept_in().folder}')
         self._replace(learner)

@@ -1,6 +1,7 @@
-"""camera: a webcam, video file, image folder or single image as image_raw and camera_info."""
+"""camera: a webcam, network camera, film, folder or picture as image_raw and camera_info."""
 
 import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,13 +10,22 @@ from rclpy.clock import Clock, ClockType
 from rclpy.executors import ExternalShutdownException
 from std_msgs.msg import Header
 
+from ja_common.camera_info_codec import encode_camera_info
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.config import Configuration, parameter
+from ja_common.core.health import Level
+from ja_common.core.stamps import NS_PER_S
 from ja_common.graph_node import GraphNode
-from ja_common.image_codec import encode_camera_info, encode_image
+from ja_common.image_codec import encode_image
 from ja_common.node_main import spin_node
 from ja_common.topics import CAMERA_INFO, IMAGE
-from ja_perception.core.frame_sources import SourceError, open_source
+from ja_perception.core.frame_sources import NotYetError, SourceError, SourceOptions
+from ja_perception.core.live_sources import shown_url
+from ja_perception.core.open_source import open_source
+
+_LEAST_NS = 1_000_000
+_LATEST_S = 1.0
+"""A node that is later than this gives up the lost time, and reports it."""
 
 
 @dataclass(frozen=True)
@@ -23,12 +33,16 @@ class CameraConfig(Configuration):
     """Where the pictures come from, and at which rate they are published."""
 
     source: str = parameter(
-        '0', 'device number or path, video file, folder of images, or image file'
+        '0', 'device number or path, address (rtsp://, http://), film, folder, or picture'
     )
     rate_hz: float = parameter(
-        0.0, "pictures a second; 0: the source's own rate, or 15", low=0.0, high=1000.0
+        0.0, "pictures a second; 0: the times of the film's own pictures, the camera's rate, or "
+        '15 for stills', low=0.0, high=1000.0,
+    )  # fmt: skip
+    highest_rate_hz: float = parameter(
+        120.0, 'pictures a second that a film or camera reaches at most', low=1.0, high=1000.0
     )
-    loop: bool = parameter(True, 'restart at the end of a file or folder')
+    loop: bool = parameter(True, 'restart at the end of a film or folder')
     still_s: float = parameter(
         5.0, 'time for which each picture of a folder is shown', low=0.0, high=3600.0
     )
@@ -39,32 +53,57 @@ class CameraConfig(Configuration):
 
 
 class CameraNode(GraphNode):
-    """Publishes pictures at a rate; ends when a file that does not loop has ended."""
+    """Publishes pictures when they are due; ends when a film that does not loop has ended."""
 
     def __init__(self, **node_kwargs: Any) -> None:
         super().__init__('camera', **node_kwargs)
         config = self._config = self.configure(CameraConfig)
-        still_frames = max(1, round(config.still_s * (config.rate_hz or 15)))
+        options = SourceOptions(
+            config.loop, config.rate_hz, config.highest_rate_hz, config.still_s
+        )
         try:
-            self._source = open_source(config.source, config.loop, still_frames)
+            self._source = open_source(config.source, options, self._warn)
         except SourceError as error:
             # An OSError ends the node with this one sentence.
             raise OSError(str(error)) from None
+        self.get_logger().info(self._source.summary)
         self._image_publisher = self.create_topic_publisher(IMAGE)
         self._info_publisher = self.create_topic_publisher(CAMERA_INFO)
-        rate_hz = config.rate_hz or self._source.rate_hz or 15.0
         # A camera delivers whatever the clocks do: only the stamps follow them.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(1 / rate_hz, self._publish_next, clock=steady)
+        self._due_s = time.monotonic() + self._source.period_s
+        self._timer = self.create_timer(self._source.period_s, self._publish_due, clock=steady)
 
-    def _publish_next(self) -> None:
+    def _warn(self, where: str, text: str) -> None:
+        self.report_problem(where, text, Level.WARN)
+
+    def _publish_due(self) -> None:
         try:
-            frame = self._source.next_frame()
+            self._publish_next()
+        except NotYetError:
+            pass
         except SourceError as error:
             self.report_problem('source', str(error))
-            return
+        self.health.values['source'] = self._source.summary
+        self._set_timer()
+
+    def _set_timer(self) -> None:
+        """Let the timer expire when the next picture is due: films have no constant rate."""
+        now_s = time.monotonic()
+        self._due_s += self._source.period_s
+        if now_s - self._due_s > _LATEST_S:
+            self._due_s = now_s
+            self._warn(
+                'pace', 'the pictures are published later than they are due: this computer does '
+                'not read and send them as fast; lower rate_hz or highest_rate_hz'
+            )  # fmt: skip
+        self._timer.timer_period_ns = max(_LEAST_NS, round((self._due_s - now_s) * NS_PER_S))
+        self._timer.reset()
+
+    def _publish_next(self) -> None:
+        frame = self._source.next_frame()
         if frame is None:
-            self.get_logger().info(f"'{self._config.source}' has ended")
+            self.get_logger().info(f"'{shown_url(self._config.source)}' has ended")
             raise ExternalShutdownException()
         stamp = self.get_clock().now().to_msg()
         header = Header(stamp=stamp, frame_id=self._config.frame_id)

@@ -10,22 +10,19 @@ import cv2
 import numpy as np
 from geometry_msgs.msg import Point, PointStamped
 from numpy.typing import NDArray
-from sensor_msgs.msg import CameraInfo, CompressedImage
+from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
+from ja_common.camera_input import CameraInput, CameraInputConfig
 from ja_common.core.annotate import annotate_image
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.config import Configuration, parameter
 from ja_common.core.detection import Detection, caregiver_face
 from ja_common.core.health import Level
+from ja_common.core.picture_watch import PictureWatch
 from ja_common.detection_codec import encode_detections
 from ja_common.graph_node import GraphNode
-from ja_common.image_codec import (
-    decode_camera_info,
-    decode_compressed,
-    decode_image,
-    encode_image,
-)
+from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.node_main import spin_node
 from ja_common.synchroniser import StampedSet, Synchroniser
@@ -57,6 +54,9 @@ class InputConfig(Configuration):
         low=0.01, high=3.0,
     )  # fmt: skip
     silent_after_s: float = parameter(2.0, 'time without images after which to warn', low=0.1)
+    frozen_after_s: float = parameter(
+        10.0, 'time of identical images after which to warn; 0: never', low=0.0, high=3600.0
+    )
     posture_wait_s: float = parameter(
         1.0, 'longest time that an image waits for the posture at its stamp', low=0.0, high=60.0
     )
@@ -77,14 +77,18 @@ class SalientFeatureDetectorNode(GraphNode):
         )
         self._detector = SalientFeatureDetector(self._finder, self._config)
         self._newest_percept: tuple[int, Percept] | None = None
-        self._calibration: CameraInfo | None = None
+        self._image_topic = IMAGE_COMPRESSED if self._input.compressed else IMAGE
+        self._camera = CameraInput(
+            self.configure(CameraInputConfig), self.resolve_topic_name(self._image_topic.name)
+        )
+        self._watch = PictureWatch(self._input.frozen_after_s)
         silent_after_s = self._input.silent_after_s
         self._synchroniser = Synchroniser(
             self,
             self._joints,
             joints_expected_every_s=silent_after_s,
             patience_s=self._input.posture_wait_s,
-            is_calibrated=lambda: self._calibration is not None,
+            is_calibrated=lambda: self._camera.has_calibration,
         )
 
         self._detections_publisher = self.create_topic_publisher(DETECTIONS)
@@ -92,7 +96,6 @@ class SalientFeatureDetectorNode(GraphNode):
         self._face_publisher = self.create_topic_publisher(FACE)
         self._face_image_publisher = self.create_topic_publisher(FACE_IMAGE)
         self._annotated_publisher = self.create_topic_publisher(IMAGE_ANNOTATED)
-        self._image_topic = IMAGE_COMPRESSED if self._input.compressed else IMAGE
         self.subscribe(CAMERA_INFO, self._on_camera_info, silent_after_s)
         self._synchroniser.call_with(
             {self._image_topic: lambda message: message},
@@ -111,8 +114,7 @@ class SalientFeatureDetectorNode(GraphNode):
         return self.configure(part.default_factory, changed)  # type: ignore[arg-type]
 
     def _on_camera_info(self, message: CameraInfo) -> None:
-        CameraModel.from_calibration(message.width, message.height, message.k, message.d)
-        self._calibration = message
+        self._camera.record_camera_info(message)
         self._synchroniser.call_ready()
 
     def _detect(self, found: StampedSet) -> None:
@@ -129,9 +131,10 @@ class SalientFeatureDetectorNode(GraphNode):
                 Level.WARN,
             )
         start = time.perf_counter()
-        compressed = isinstance(message, CompressedImage)
-        image = decode_compressed(message) if compressed else decode_image(message)
-        camera = self._camera(image)
+        image = self._camera.decode(message)
+        if problem := self._watch.record_picture(image, time.monotonic()):
+            self.report_problem('picture', problem, Level.WARN)
+        camera = self._camera_of(image)
         if self._newest_percept is None or self._newest_percept[0] != stamp_ns:
             self._newest_percept = (
                 stamp_ns,
@@ -139,11 +142,12 @@ class SalientFeatureDetectorNode(GraphNode):
             )
         # The same image again (a sim that lost the answer): the same answer again.
         percept = self._newest_percept[1]
-        self._publish_percept(message.header, percept)
+        header = self._camera.upright_header(message.header)
+        self._publish_percept(header, percept)
         seconds = time.perf_counter() - start
         self.health.values['time an image [ms]'] = f'{1000 * seconds:.2f}'
         if self._annotated_publisher.get_subscription_count():
-            self._publish_annotated(message.header, image, percept, camera, seconds)
+            self._publish_annotated(header, image, percept, camera, seconds)
 
     def _publish_percept(self, header: Header, percept: Percept) -> None:
         # The face image goes first: a node that reads `attended` can rely on it.
@@ -174,10 +178,9 @@ class SalientFeatureDetectorNode(GraphNode):
         )
         self._annotated_publisher.publish(encode_image(drawn, header.stamp, header.frame_id))
 
-    def _camera(self, image: NDArray[np.uint8]) -> CameraModel:
+    def _camera_of(self, image: NDArray[np.uint8]) -> CameraModel:
         """Return the calibrated camera for images of this size, or an ideal one."""
-        height, width = image.shape[:2]
-        camera = decode_camera_info(self._calibration, width, height)
+        camera = self._camera.camera(image)
         if camera is not None:
             return camera
         field_of_view_rad = self._input.field_of_view_rad
@@ -187,6 +190,7 @@ class SalientFeatureDetectorNode(GraphNode):
             f'{math.degrees(field_of_view_rad):.0f} degrees is assumed (field_of_view_rad)',
             Level.WARN,
         )
+        height, width = image.shape[:2]
         return CameraModel.from_field_of_view(width, height, field_of_view_rad)
 
 

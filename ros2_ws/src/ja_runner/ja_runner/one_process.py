@@ -3,10 +3,12 @@
 from collections.abc import Callable, Sequence
 
 from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
 from ja_common.core.config import ConfigError
 from ja_common.executor import CachedWaitSetExecutor
+from ja_common.node_main import check_parameters
 from ja_common.private_context import private_context
 from ja_common.stop_signals import StopSignals
 from ja_runner.node_spec import NodeSpec
@@ -25,6 +27,8 @@ def run_in_one_process(
     try:
         with StopSignals() as stop, private_context() as context:
             _run_nodes(graph, make_observer, lambda: stop.requested or done(), context)
+    except ExternalShutdownException:
+        pass  # a node has ended the graph: a film without a loop is over
     except (ConfigError, OSError) as error:
         report(f'error: {error}')
         return 2
@@ -45,6 +49,7 @@ def _run_nodes(
             arguments = spec.ros_arguments()
             node = make(context=context, cli_args=arguments, use_global_arguments=False)
             nodes.append(node)
+            check_parameters(node, arguments[1:])
         nodes.append(make_observer(context))
         for node in nodes:
             executor.add_node(node)

@@ -12,11 +12,13 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
+from sensor_msgs.msg import JointState
 
 from ja_common.core.learning_curve import LearningCurve
 from ja_common.graph_node import GraphNode
 from ja_common.status_values import status_values
-from ja_common.topics import DIAGNOSTICS, EVERY_SCORE, GATE_STATUS
+from ja_common.time_codec import to_ns
+from ja_common.topics import DIAGNOSTICS, EVERY_SCORE, FIXATION, GATE_STATUS
 
 WINDOW_TRIALS = 100
 _SCREEN_EVERY_S = 0.25
@@ -35,30 +37,38 @@ class ProgressNode(GraphNode):
         self.objects = 1
         self.began_s = math.nan
         self._image_times_s: deque[float] = deque(maxlen=200)
+        self._newest_ns = -1
         self.subscribe(GATE_STATUS, self._on_gate_status)
+        self.subscribe(FIXATION, self._on_image)
         self.subscribe(EVERY_SCORE, self._on_score)
         self.subscribe(DIAGNOSTICS, self._on_diagnostics)
 
     @property
     def elapsed_s(self) -> float:
-        """Return the wall time [s] since the gate answered the first image; 0 before."""
+        """Return the wall time [s] since the gate's first status; 0 before."""
         return 0.0 if math.isnan(self.began_s) else time.monotonic() - self.began_s
 
     @property
     def images_per_s(self) -> float:
-        """Return the recent rate of images [1/s] that the gate has answered."""
+        """Return the recent rate of images [1/s] that the graph has processed."""
         times = self._image_times_s
         if len(times) < 2 or time.monotonic() - times[-1] > 2.0:
             return 0.0
         return (len(times) - 1) / max(times[-1] - times[0], 1e-9)
 
     def _on_gate_status(self, message: DiagnosticStatus) -> None:
-        now = time.monotonic()
         if math.isnan(self.began_s):
-            self.began_s = now
+            self.began_s = time.monotonic()
         self.gate = status_values(message)
+
+    def _on_image(self, message: JointState) -> None:
+        """Count an image: each has one message here, with its stamp; the gate has more."""
+        stamp_ns = to_ns(message.header.stamp)
+        if stamp_ns == self._newest_ns:
+            return  # the sim sends an image again whose answer was lost
+        self._newest_ns = stamp_ns
         self.images += 1
-        self._image_times_s.append(now)
+        self._image_times_s.append(time.monotonic())
 
     def _on_score(self, message: DiagnosticStatus) -> None:
         values = status_values(message)

@@ -18,9 +18,10 @@ from ja_runner.companion import Companion
 from ja_runner.image_transport import image_loss_warning
 from ja_runner.node_spec import NodeSpec
 from ja_runner.one_process import run_in_one_process
+from ja_runner.parameter_files import check_parameter_files
 from ja_runner.parts import check_installed, is_installed
 from ja_runner.progress import Display, ProgressNode
-from ja_runner.running_nodes import claim_names
+from ja_runner.running_nodes import claim_names, full_names
 from ja_runner.supervisor import DEFAULT, Supervision, Supervisor
 
 # Learner and gate save into the same folder, so that both resume from the same trial.
@@ -44,7 +45,8 @@ def run_graph(
 ) -> tuple[int, ProgressNode]:
     """Run until `done`, a signal, or a death; return the exit code and the progress node.
 
-    Raises ConfigError if nodes of the same names run in this ROS domain already.
+    Raises ConfigError if nodes of the same names run in this ROS domain already, or for a
+    parameter file that is for none of the nodes.
     `arguments`: the ROS arguments of all nodes (the progress node gets the namespace as well).
     `memory`: the folder in which learner and gate save what they learned, and from which they
     resume if it is there; by default `folder`.
@@ -56,6 +58,8 @@ def run_graph(
     for place in {folder, memory or folder}:
         check_writable(place)
     graph = [_with_memory(spec, (memory or folder).absolute()) for spec in graph]
+    beside_graph = [NodeSpec('ja_dashboard', 'view', arguments=arguments)] if view else []
+    unread = check_parameter_files(full_names([*graph, *beside_graph]), arguments)
     progress: list[ProgressNode] = []
 
     def make_progress_node(context: Context) -> ProgressNode:
@@ -64,12 +68,13 @@ def run_graph(
         return progress[0]
 
     with claim_names(graph), Display(title) as display, ExitStack() as beside:
+        for sentence in unread:
+            display.print_line(f'warning: {sentence}')
         page: Companion | None = None
         if view and not is_installed('ja_dashboard'):
             display.print_line('there is no live page: the dashboard is not installed')
         elif view:
-            spec = NodeSpec('ja_dashboard', 'view', arguments=arguments)
-            page = Companion(spec, folder / 'log', display.print_line, LIVE_PAGE)
+            page = Companion(beside_graph[0], folder / 'log', display.print_line, LIVE_PAGE)
             beside.enter_context(page)
 
         def is_done() -> bool:

@@ -41,7 +41,7 @@ def claim_names(graph: Sequence[NodeSpec]) -> Iterator[None]:
     """
     with private_context(discovery=False) as context:
         domain_id = context.get_domain_id()
-        names = sorted({_full_name(spec, context) for spec in graph})
+    names = full_names(graph)
     with ExitStack() as claims:
         taken = [name for name in names if not _claim(name, domain_id, claims)]
         if taken := taken or _running(names, domain_id):
@@ -52,6 +52,12 @@ def claim_names(graph: Sequence[NodeSpec]) -> Iterator[None]:
                 'set another ROS_DOMAIN_ID, or add a namespace: --ros-args -r __ns:=/NAME'
             )
         yield
+
+
+def full_names(graph: Sequence[NodeSpec]) -> list[str]:
+    """Return the names of a graph's nodes, namespaces and remaps included, sorted."""
+    with private_context(discovery=False) as context:
+        return sorted({_full_name(spec, context) for spec in graph})
 
 
 def _full_name(spec: NodeSpec, context: Context) -> str:

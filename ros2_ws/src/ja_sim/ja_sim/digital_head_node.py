@@ -7,9 +7,11 @@ from typing import Any
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import Header
 
+from ja_common.camera_info_codec import encode_camera_info
+from ja_common.camera_input import CameraInput, CameraInputConfig
 from ja_common.core.config import Configuration, parameter
 from ja_common.graph_node import GraphNode
-from ja_common.image_codec import decode_image, encode_camera_info, encode_image
+from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.node_main import spin_node
 from ja_common.time_codec import to_ns
@@ -32,6 +34,8 @@ class DigitalHeadNode(GraphNode):
         self._config = self.configure(DigitalHeadConfig)
         self._frame_id = self.configure(FrameConfig).frame_id
         self._joints = JointCodec(self.configure(JointConfig))
+        wide = self.resolve_topic_name(WIDE_IMAGE.name)
+        self._camera = CameraInput(self.configure(CameraInputConfig), wide)
         self._head = DigitalHead(self._config)
         self._joint_publisher = self.create_topic_publisher(JOINT_STATES)
         self._info_publisher = self.create_topic_publisher(CAMERA_INFO)
@@ -40,17 +44,19 @@ class DigitalHeadNode(GraphNode):
         self.subscribe(WIDE_IMAGE, self._on_wide_image, expected_every_s=2.0)
 
     def _on_command(self, message: JointState) -> None:
-        posture = self._joints.decode_posture(message)
-        if posture is not None:
-            self._head.command(posture)
+        self._head.command(self._joints.decode_command(message, self._head.target))
 
     def _on_wide_image(self, message: Image) -> None:
-        view, posture = self._head.render_view(decode_image(message), to_ns(message.header.stamp))
+        view, posture = self._head.render_view(
+            self._camera.decode(message), to_ns(message.header.stamp)
+        )
         header = Header(stamp=message.header.stamp, frame_id=self._frame_id)
         self._joint_publisher.publish(
             self._joints.encode_posture(header, posture.position, posture.velocity)
         )
-        width, height = self._config.view_width_px, self._config.view_height_px
+        # The window is that of a camera which is mounted as the wide one is.
+        view = self._camera.as_mounted(view)
+        height, width = view.shape[:2]
         self._info_publisher.publish(
             encode_camera_info(header, width, height, self._head.focal_px)
         )

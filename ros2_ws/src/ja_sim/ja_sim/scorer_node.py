@@ -79,6 +79,7 @@ class ScorerNode(GraphNode):
         self._score_publisher.publish(
             DiagnosticStatus(
                 name=self.get_fully_qualified_name(),
+                hardware_id=self.get_namespace(),
                 message=f'{rates["all"].successes} of {rates["all"].trials} trials',
                 values=[KeyValue(key=key, value=value) for key, value in values.items()],
             )

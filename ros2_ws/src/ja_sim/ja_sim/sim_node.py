@@ -17,11 +17,12 @@ from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
+from ja_common.camera_info_codec import encode_camera_info
 from ja_common.core.config import ConfigError, Configuration, parameter
 from ja_common.core.health import Level
 from ja_common.core.stamps import NS_PER_S
 from ja_common.graph_node import GraphNode
-from ja_common.image_codec import encode_camera_info, encode_image
+from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.node_main import spin_node
 from ja_common.time_codec import to_ns, to_time
@@ -39,6 +40,12 @@ from ja_sim.core.world import JointAttentionWorld
 from ja_sim.truth_codec import encode_truth
 
 CAMERA_FRAME = 'camera_optical_frame'
+BASE_FRAME = 'base_link'
+"""The frame in which the pan-tilt head stands; the positions of the truth are in it."""
+
+CLOCK_RATE_HZ = 100.0
+"""In real time the clock passes in steps of this rate [1/s of wall time], between images too."""
+
 _T = TypeVar('_T')
 
 
@@ -123,10 +130,14 @@ class SimNode(GraphNode):
         self._drawn: Future[_Round] | None = None
         self._round = self._next_round()
         self._published_s = -math.inf
+        self._ticked_s = time.monotonic()
+        self._clock_ns = 0
         self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
         self._pace = Pace(self._config.lockstep)
         self._period_timer: Timer | None = None
         self._set_speed(self._live.real_time_factor)
+        if not self._config.lockstep:
+            self.create_timer(1 / CLOCK_RATE_HZ, self._advance_clock, clock=self._steady)
         self.create_timer(self._config.resend_after_s / 5, self._resend, clock=self._steady)
 
     def destroy_node(self) -> None:
@@ -158,6 +169,7 @@ class SimNode(GraphNode):
 
     def _tick(self) -> None:
         self._round = self._next_round()
+        self._ticked_s = time.monotonic()
         self._pace.record_image()
         self._publish()
 
@@ -208,7 +220,9 @@ class SimNode(GraphNode):
         now = self._header(self._world.now_ns).stamp
         return _Round(
             Clock(clock=now),
-            encode_truth(header, self._world.truth_at_exposure()),
+            encode_truth(
+                self._header(observation.stamp_ns, BASE_FRAME), self._world.truth_at_exposure()
+            ),
             joint_states,
             encode_camera_info(header, lens.width, lens.height, lens.fx, lens.fy),
             encode_image(observation.image, header.stamp, CAMERA_FRAME),
@@ -216,12 +230,26 @@ class SimNode(GraphNode):
 
     def _publish(self) -> None:
         self._published_s = time.monotonic()
-        self._simulated_time.publish(self._round.clock)
+        self._publish_clock(to_ns(self._round.clock.clock))
         self._truth.publish(self._round.truth)
         for message in self._round.joint_states:
             self._joint_states.publish(message)
         self._camera_info.publish(self._round.camera_info)
         self._image.publish(self._round.image)
+
+    def _advance_clock(self) -> None:
+        """Let time pass between two images, up to the next one, as the clock of a rig does."""
+        if self._pace.paused:
+            return
+        passed_s = (time.monotonic() - self._ticked_s) * self._factor
+        period_ns = NS_PER_S / self._config.camera_rate_hz
+        ahead_ns = int(min(passed_s * NS_PER_S, period_ns - 1))
+        self._publish_clock(to_ns(self._round.clock.clock) + ahead_ns)
+
+    def _publish_clock(self, now_ns: int) -> None:
+        # Never back: an image that is sent again in a pause is older than the clock.
+        self._clock_ns = max(now_ns, self._clock_ns)
+        self._simulated_time.publish(Clock(clock=to_time(self._clock_ns)))
 
     def _header(self, stamp_ns: int, frame_id: str = '') -> Header:
         return Header(stamp=to_time(stamp_ns + self._time_offset_ns), frame_id=frame_id)
@@ -269,6 +297,7 @@ class SimNode(GraphNode):
             self.destroy_timer(self._period_timer)
             self._period_timer = None
         factor = real_time_factor or (0.0 if self._config.lockstep else 1.0)
+        self._factor = factor
         self._pace.has_timer = factor > 0.0
         if factor:
             period_s = 1 / (self._config.camera_rate_hz * factor)

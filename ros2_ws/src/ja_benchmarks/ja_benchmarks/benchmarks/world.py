@@ -19,6 +19,7 @@ from ja_benchmarks.rows import Row, mean_row, share_row
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.box import Box
 from ja_perception.core.face_crop import crop_face
+from ja_perception.core.haar import read_cascade
 from ja_sim.core.caregiver import identities
 from ja_sim.core.scene import Scene, load_scene
 from ja_sim.core.specs import HEAD_PRESETS
@@ -189,9 +190,7 @@ def _centerface() -> CenterFace:
 
 @cache
 def _cascades() -> tuple[cv2.CascadeClassifier, cv2.CascadeClassifier]:
-    names = ('haarcascade_frontalface_alt2.xml', 'haarcascade_profileface.xml')
-    frontal, profile = (cv2.CascadeClassifier(cv2.data.haarcascades + name) for name in names)
-    return frontal, profile
+    return read_cascade('frontalface_alt2'), read_cascade('profileface')
 
 
 def _turned_faces(size: tuple[int, int], turn_deg: float, seeds: int) -> Iterator[np.ndarray]:

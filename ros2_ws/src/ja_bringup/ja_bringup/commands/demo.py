@@ -3,7 +3,7 @@
 import sys
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Optional
 
 import typer
 
@@ -44,7 +44,7 @@ def demo(
         DemoLearner, typer.Option(help="The fast learner, or the paper's network.")
     ] = DemoLearner.gaze_line,
     trials: Annotated[
-        int | None,
+        Optional[int],
         typer.Option(
             min=1,
             help=f'Practise for so many trials; {PRACTICE_TRIALS["gaze_line"]} by default, '
@@ -60,7 +60,7 @@ def demo(
     ] = 100,
     seed: Annotated[int, typer.Option(min=0, help='Seed of the world and of the robot.')] = 0,
     scene: Annotated[
-        str | None,
+        Optional[str],
         typer.Option(
             help=f'Scene of the sim, by name or file; by default {SCENE["gaze_line"]}, or with '
             f"the paper's learner {SCENE['paper']}."
@@ -75,7 +75,8 @@ def demo(
         ),
     ] = False,
     resume: Annotated[
-        Path | None, typer.Option(help='Resume the run in this folder, with all that it learned.')
+        Optional[Path],
+        typer.Option(help='Resume the run in this folder, with all that it learned.'),
     ] = None,
     swap: Swap = None,
     record: Record = False,

@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Optional
 
 import typer
 
@@ -21,11 +21,11 @@ def _benchmark_names() -> list[str]:
 
 def bench(
     name: Annotated[
-        str | None,
+        Optional[str],
         typer.Argument(help='Which benchmark; all without it.', autocompletion=_benchmark_names),
     ] = None,
     json_file: Annotated[
-        Path | None, typer.Option('--json', help='Write the figures to this file.')
+        Optional[Path], typer.Option('--json', help='Write the figures to this file.')
     ] = None,
 ) -> None:
     """Measure: a table of figures, each with its unit, count and interval."""
@@ -37,12 +37,12 @@ def bench(
 def reference(
     folder: Annotated[Path, typer.Option(help='Folder of the pages.')] = Path('docs'),
 ) -> None:
-    """Write topics.md and parameters.md from the running code."""
+    """Write topics.md and parameters.md from the running code; a copy is for `gate --help`."""
     from rich.console import Console
 
-    from ja_bringup.reference import write_reference
+    from ja_bringup.reference import copy_into_package, write_reference
 
     with Console(stderr=True).status('starting every node ...'):
-        pages = write_reference(folder)
+        pages = [*write_reference(folder), copy_into_package(folder)]
     for page in pages:
         typer.echo(page)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Optional
 
 import typer
 
@@ -30,7 +30,7 @@ def figures(
     scene: Annotated[str, typer.Option(help='Scene of the sim, by name or file.')] = 'default',
     looks_seed: Annotated[int, typer.Option(min=0, help='Seed of the caregiver.')] = 0,
     data: Annotated[
-        Path | None,
+        Optional[Path],
         typer.Option(help='Folder of `./ja export`: recorded looks in place of rendered ones.'),
     ] = None,
     pool: Annotated[
@@ -38,7 +38,7 @@ def figures(
         typer.Option(min=0, help='Recorded looks to learn from; 0: 125, or four fifths of them.'),
     ] = 0,
     workers: Annotated[int, typer.Option(min=1, help='Cores to use.')] = _CORES,
-    output: Annotated[Path | None, typer.Option(help='Folder of the report.')] = None,
+    output: Annotated[Optional[Path], typer.Option(help='Folder of the report.')] = None,
 ) -> None:
     """Reproduce Figures 6 and 7 of the paper, without ROS, and write a report."""
     from ja_common.core.files import SaveError, check_writable
@@ -71,11 +71,12 @@ def figures(
 def sweep(
     config: Annotated[Path, typer.Argument(help='The grid, as YAML.')],
     scheduler: Annotated[
-        str | None, typer.Option(help='Address of a Dask scheduler; without it, local processes.')
+        Optional[str],
+        typer.Option(help='Address of a Dask scheduler; without it, local processes.'),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help='Local processes.')] = _CORES,
     output: Annotated[
-        Path | None,
+        Optional[Path],
         typer.Option(help='Folder of the results; a run in a folder with results resumes.'),
     ] = None,
 ) -> None:

@@ -1,7 +1,7 @@
 """Options that several commands of `./ja` share."""
 
 from enum import Enum
-from typing import Annotated
+from typing import Annotated, Optional
 
 import typer
 
@@ -26,7 +26,7 @@ OneProcess = Annotated[bool, typer.Option('--one-process', help='All nodes in on
 Record = Annotated[bool, typer.Option('--record', help='Record all topics into runs/.')]
 View = Annotated[bool, typer.Option(help='Serve the live page, and print its address.')]
 Swap = Annotated[
-    list[str] | None,
+    Optional[list[str]],
     typer.Option(
         help='Run your node in place of one of ours: gate=my_lab/my_gate. May be given several '
         'times.'

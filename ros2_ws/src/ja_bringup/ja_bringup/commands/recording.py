@@ -2,9 +2,11 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Optional
 
 import typer
+
+_RECORDING = 'A .mcap or .db3 file, compressed or not, or the folder of one recording.'
 
 
 def register(app: typer.Typer) -> None:
@@ -17,7 +19,8 @@ def register(app: typer.Typer) -> None:
 def record(
     context: typer.Context,
     output: Annotated[
-        Path | None, typer.Option(help='Folder of the recording; runs/<time>-record without it.')
+        Optional[Path],
+        typer.Option(help='Folder of the recording; runs/<time>-record without it.'),
     ] = None,
     exclude: Annotated[
         str, typer.Option(help='Regular expression: topics that it matches are left out.')
@@ -49,18 +52,18 @@ def record(
 
 def replay(
     context: typer.Context,
-    recording: Annotated[Path, typer.Argument(help='A .mcap file, or a folder of them.')],
+    recording: Annotated[Path, typer.Argument(help=_RECORDING)],
     speed: Annotated[
         float, typer.Option(min=0.001, max=1000.0, help='Recorded seconds per second.')
     ] = 1.0,
     without: Annotated[
-        list[str] | None, typer.Option(help='A topic to leave out; may be given several times.')
+        Optional[list[str]], typer.Option(help='A topic to leave out; may be given several times.')
     ] = None,
     score: Annotated[
         bool, typer.Option('--score', help='Publish nothing: train a learner and print its curve.')
     ] = False,
     csv_file: Annotated[
-        Path | None,
+        Optional[Path],
         typer.Option('--csv', help='With --score: write one row for each trial into this file.'),
     ] = None,
     as_json: Annotated[bool, typer.Option('--json', help='With --score: print JSON.')] = False,
@@ -71,7 +74,11 @@ def replay(
     if score:
         from ja_bringup.recorded_trials import score as run_score
 
-        sys.exit(run_score(recording, csv_file, as_json, context.obj or []))
+        if speed != 1.0:
+            raise typer.BadParameter('--speed is for a replay: --score goes as fast as it can')
+        sys.exit(run_score(recording, without or (), csv_file, as_json, context.obj or []))
+    if csv_file is not None or as_json:
+        raise typer.BadParameter('--csv and --json are for --score')
 
     parameters = {
         'recording': str(recording),
@@ -83,9 +90,7 @@ def replay(
 
 def export(
     context: typer.Context,
-    recordings: Annotated[
-        list[Path], typer.Argument(help='Recordings: .mcap files, or folders of them.')
-    ],
+    recordings: Annotated[list[Path], typer.Argument(help=f'{_RECORDING} Several may be given.')],
     to: Annotated[Path, typer.Option('--to', help='Folder of the data set; it is created.')],
     licence: Annotated[
         str, typer.Option(help='The licence that the card of the data set names.')

@@ -1,7 +1,7 @@
 """The command `rig`, for `./ja`."""
 
 import sys
-from typing import Annotated
+from typing import Annotated, Optional
 
 import typer
 
@@ -26,10 +26,10 @@ def register(app: typer.Typer) -> None:
 def rig(
     context: typer.Context,
     source: Annotated[
-        str | None,
+        Optional[str],
         typer.Option(
-            help='Webcam device, video file or image folder, in which a digital head looks '
-            "around. Without it, the graph uses the rig's own camera and motors."
+            help='Webcam, address (rtsp://...), film or folder of pictures, in which a digital '
+            "head looks around. Without it, the graph uses the rig's own camera and motors."
         ),
     ] = None,
     time_s: Annotated[

@@ -1,23 +1,21 @@
-"""A pinhole camera with lens distortion: between pixels and rays of the optical frame."""
+"""A pinhole or fisheye camera: between pixels and rays of the optical frame."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-_UNTIL_EXACT = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-6)
+from ja_common.core.lens import Lens
 
 
 @dataclass(frozen=True)
 class CameraModel:
     """Intrinsics in pixels for images of one size; pixel (0, 0) is the centre of the first pixel.
 
-    ``distortion`` holds OpenCV's coefficients (plumb_bob, or rational_polynomial when longer);
-    empty means none.
+    ``lens`` is None where there is no distortion. ``skew`` holds the entries of K beside fx and
+    fy, for sensors whose axes are not at right angles.
     """
 
     width: int
@@ -26,7 +24,8 @@ class CameraModel:
     fy: float
     cx: float
     cy: float
-    distortion: tuple[float, ...] = ()
+    lens: Lens | None = None
+    skew: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
     def from_field_of_view(
@@ -36,58 +35,58 @@ class CameraModel:
         focal = width / 2 / math.tan(field_of_view_rad / 2)
         return cls(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
 
-    @classmethod
-    def from_calibration(
-        cls, width: int, height: int, k: Sequence[float], distortion: Sequence[float] = ()
-    ) -> 'CameraModel | None':
-        """Make a camera from the row-major 3x3 matrix ``k`` of CameraInfo; None when it is zero.
-
-        A matrix of zeros means that the camera is not calibrated. Raises ``ValueError``
-        when the focal lengths are not positive and finite.
-        """
-        fx, fy, cx, cy = k[0], k[4], k[2], k[5]
-        if not any(k):
-            return None
-        if not (all(math.isfinite(value) for value in (fx, fy, cx, cy)) and min(fx, fy) > 0):
-            raise ValueError(f'focal lengths must be positive, not fx={fx} fy={fy}')
-        distorted = any(distortion)
-        return cls(width, height, fx, fy, cx, cy, tuple(distortion) if distorted else ())
-
     @cached_property
     def matrix(self) -> NDArray[np.float64]:
         """Return K, shape (3, 3)."""
-        return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1.0]])
+        right, down = self.skew
+        return np.array([[self.fx, right, self.cx], [down, self.fy, self.cy], [0, 0, 1.0]])
 
     @cached_property
     def inverse_matrix(self) -> NDArray[np.float64]:
         """Return K^-1, shape (3, 3)."""
         return np.linalg.inv(self.matrix).astype(np.float64)
 
+    @property
+    def half_view_rad(self) -> tuple[float, float]:
+        """Return half of the angle that the image spans, across and down through its centre."""
+        middle = ((self.width - 1) / 2, (self.height - 1) / 2)
+        left, right = self.rays([[-0.5, middle[1]], [self.width - 0.5, middle[1]]])[:, 0]
+        top, bottom = self.rays([[middle[0], -0.5], [middle[0], self.height - 0.5]])[:, 1]
+        return (
+            (math.atan(right) - math.atan(left)) / 2,
+            (math.atan(bottom) - math.atan(top)) / 2,
+        )
+
     def resized(self, width: int, height: int) -> 'CameraModel':
         """Return the same camera for images of another size [px]."""
         return _resized(self, width, height)
 
+    def cropped(self, left: int, top: int, width: int, height: int) -> 'CameraModel':
+        """Return the camera of a window in the image, at pixel (left, top)."""
+        return replace(self, width=width, height=height, cx=self.cx - left, cy=self.cy - top)
+
+    def turned(self, quarter_turns: int) -> 'CameraModel':
+        """Return the camera of the image turned clockwise by 90 degrees so many times."""
+        return _turned(self, quarter_turns % 4)
+
     def rays(self, pixels: ArrayLike) -> NDArray[np.float64]:
         """Return the rays (x, y), z = 1, of pixels (u, v), both (..., 2), without distortion."""
         pixels = np.asarray(pixels, float)
-        if self.distortion:
-            # The default of five iterations leaves errors of some hundredths of a pixel.
-            points = cv2.undistortPointsIter(
-                pixels.reshape(-1, 1, 2), self.matrix, np.array(self.distortion),
-                np.eye(3), np.eye(3), _UNTIL_EXACT,
-            )  # fmt: skip
-            return points.reshape(pixels.shape)
-        return (pixels - (self.cx, self.cy)) / (self.fx, self.fy)
+        if any(self.skew):
+            bent = (pixels - (self.cx, self.cy)) @ self.inverse_matrix[:2, :2].T
+        else:
+            bent = (pixels - (self.cx, self.cy)) / (self.fx, self.fy)
+        return bent if self.lens is None else self.lens.straighten(bent)
 
     def pixels(self, rays: ArrayLike) -> NDArray[np.float64]:
         """Return the pixels (u, v), shape (..., 2), at which rays (x, y) are seen."""
         rays = np.asarray(rays, float)
-        if self.distortion:
-            points = np.concatenate([rays.reshape(-1, 2), np.ones((rays.size // 2, 1))], axis=1)
-            seen, _ = cv2.projectPoints(
-                points, np.zeros(3), np.zeros(3), self.matrix, np.array(self.distortion)
-            )
-            return seen.reshape(rays.shape)
+        return self.straight_pixels(rays if self.lens is None else self.lens.bend(rays))
+
+    def straight_pixels(self, rays: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the pixels, shape (..., 2), of rays (x, y) in the image without distortion."""
+        if any(self.skew):
+            return rays @ self.matrix[:2, :2].T + (self.cx, self.cy)
         return rays * (self.fx, self.fy) + (self.cx, self.cy)
 
     def contains(self, pixel: ArrayLike) -> bool:
@@ -100,6 +99,7 @@ class CameraModel:
 def _resized(camera: CameraModel, width: int, height: int) -> CameraModel:
     # Cached: every image asks for it, and its matrices are cached with it.
     sx, sy = width / camera.width, height / camera.height
+    right, down = camera.skew
     return replace(
         camera,
         width=width,
@@ -108,4 +108,19 @@ def _resized(camera: CameraModel, width: int, height: int) -> CameraModel:
         fy=camera.fy * sy,
         cx=(camera.cx + 0.5) * sx - 0.5,
         cy=(camera.cy + 0.5) * sy - 0.5,
+        skew=(right * sx, down * sy),
     )
+
+
+@lru_cache(maxsize=16)
+def _turned(camera: CameraModel, quarter_turns: int) -> CameraModel:
+    for _ in range(quarter_turns):
+        lens = camera.lens
+        right, down = camera.skew
+        camera = CameraModel(
+            camera.height, camera.width, camera.fy, camera.fx,
+            camera.height - 1 - camera.cy, camera.cx,
+            lens and replace(lens, quarter_turns=(lens.quarter_turns + 1) % 4),
+            (-down, -right),
+        )  # fmt: skip
+    return camera

@@ -56,11 +56,11 @@ class PatientQueue(Generic[Item]):
                 or not (calibrated or self._uncalibrated)
             ):
                 break
-            self._fixed = self._postures.newest is None
+            self._fixed = self._postures.newest_stamp_ns is None
             self._uncalibrated = not calibrated
             self._waiting.popleft()
             yield first.item, first.stamp_ns, posture
 
     def _posture_may_come(self, stamp_ns: int) -> bool:
-        newest = self._postures.newest
-        return not self._fixed if newest is None else newest.stamp_ns < stamp_ns
+        newest_ns = self._postures.newest_stamp_ns
+        return not self._fixed if newest_ns is None else newest_ns < stamp_ns

@@ -1,7 +1,6 @@
 """The head's posture at the moment an image was taken, from the stream of joint states."""
 
-from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -9,15 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ja_common.core.geometry import finite_pair
-from ja_common.core.stamps import NS_PER_S
+from ja_common.core.joint_track import JointReading, JointTrack
 
 Item = TypeVar('Item')
-
-REORDERED_WITHIN_S = 0.25
-"""A sample older than the newest by more than this was not overtaken: the clock was set back."""
-
-LONGEST_GAP_S = 0.5
-"""Between samples farther apart than this the posture is unknown."""
 
 STILL_BELOW_RAD_S = 0.05
 """Speed [rad/s] below which a joint stands still, the default of every node."""
@@ -39,15 +32,14 @@ class Posture:
 class PostureHistory:
     """Joint states of the last seconds, interpolated linearly at any stamp among them.
 
-    Samples that overtook each other are put in order, duplicates are dropped. One that is older by
-    more means that the clock was set back: the history starts again from it. No gap of more than
-    half a second is bridged.
+    Each joint has its own samples, so pan and tilt may come at different times and rates. Samples
+    that overtook each other are put in order, duplicates are dropped. One that is older by more
+    means that the clock was set back: the history starts again from it. No gap of more than half
+    a second is bridged.
     """
 
     def __init__(self, horizon_s: float = 2.0) -> None:
-        self._horizon_ns = int(horizon_s * NS_PER_S)
-        self._stamps: list[int] = []
-        self._samples: list[Posture] = []
+        self._tracks = (JointTrack(horizon_s), JointTrack(horizon_s))
 
     def record_posture(
         self, stamp_ns: int, position: ArrayLike, velocity: ArrayLike | None = None
@@ -56,54 +48,70 @@ class PostureHistory:
 
         Raises ValueError for values that are not two finite numbers; nothing is then added.
         """
-        position = finite_pair('joint position', position)
-        if self._stamps and stamp_ns < self._stamps[-1] - _ns(REORDERED_WITHIN_S):
-            self.clear()
-        index = bisect_left(self._stamps, stamp_ns)
-        if index < len(self._stamps) and self._stamps[index] == stamp_ns:
-            return
+        positions = finite_pair('joint position', position).tolist()
+        velocities = [None, None]
         if velocity is not None:
-            velocity = finite_pair('joint velocity', velocity)
-        elif index:
-            before = self._samples[index - 1]
-            seconds = (stamp_ns - before.stamp_ns) / NS_PER_S
-            velocity = (position - before.position) / seconds
-        else:
-            velocity = np.zeros(2)
-        self._stamps.insert(index, stamp_ns)
-        self._samples.insert(index, Posture(stamp_ns, position, velocity))
-        expired = bisect_left(self._stamps, self._stamps[-1] - self._horizon_ns)
-        del self._stamps[:expired], self._samples[:expired]
+            velocities = finite_pair('joint velocity', velocity).tolist()
+        for joint in range(2):
+            self.record_joint(joint, stamp_ns, positions[joint], velocities[joint])
+
+    def record_joint(
+        self, joint: int, stamp_ns: int, position: float, velocity: float | None = None
+    ) -> None:
+        """Record a sample of one joint, 0 pan or 1 tilt: position [rad], velocity [rad/s].
+
+        Raises ValueError for a number that is not finite; nothing is then added.
+        """
+        if self._tracks[joint].is_set_back(stamp_ns):
+            self.clear()
+        self._tracks[joint].record_sample(stamp_ns, position, velocity)
 
     def clear(self) -> None:
         """Forget everything."""
-        self._stamps.clear()
-        self._samples.clear()
+        for track in self._tracks:
+            track.clear()
+
+    @property
+    def newest_stamp_ns(self) -> int | None:
+        """Return the newest stamp at which both joints are known; None before."""
+        pan, tilt = (track.newest for track in self._tracks)
+        return None if pan is None or tilt is None else min(pan.stamp_ns, tilt.stamp_ns)
 
     @property
     def newest(self) -> Posture | None:
-        """Return the latest sample; for an image use `at` with the image's stamp, never this."""
-        return self._samples[-1] if self._samples else None
+        """Return the latest posture; for an image use `at` with the image's stamp, never this.
+
+        Its stamp is that of the joint whose newest sample is older.
+        """
+        stamp_ns = self.newest_stamp_ns
+        if stamp_ns is None:
+            return None
+        # Within a gap of the other joint, or before its first sample: its newest one.
+        return _posture(stamp_ns, [track.at(stamp_ns) or track.newest for track in self._tracks])
 
     def at(self, stamp_ns: int) -> Posture | None:
         """Return the posture at a stamp; None outside of what is known (yet), and within a gap."""
-        index = bisect_left(self._stamps, stamp_ns)
-        if index == len(self._stamps):
-            return None
-        after = self._samples[index]
-        if after.stamp_ns == stamp_ns:
-            return after
-        if index == 0:
-            return None
-        before = self._samples[index - 1]
-        if after.stamp_ns - before.stamp_ns > _ns(LONGEST_GAP_S):
-            return None
-        share = (stamp_ns - before.stamp_ns) / (after.stamp_ns - before.stamp_ns)
-        return Posture(
-            stamp_ns,
-            before.position + share * (after.position - before.position),
-            before.velocity + share * (after.velocity - before.velocity),
-        )
+        return _posture(stamp_ns, [track.at(stamp_ns) for track in self._tracks])
+
+    def why_unknown(self, stamp_ns: int) -> list[str]:
+        """Return for pan and tilt why `at` does not know the joint there; '' where it does."""
+        return [track.why_unknown(stamp_ns) for track in self._tracks]
+
+    @property
+    def ignores_velocity(self) -> list[bool]:
+        """Return for pan and tilt whether the velocity given is 0 also while the joint moves."""
+        return [track.ignores_velocity for track in self._tracks]
+
+
+def _posture(stamp_ns: int, joints: Sequence[JointReading | None]) -> Posture | None:
+    pan, tilt = joints
+    if pan is None or tilt is None:
+        return None
+    return Posture(
+        stamp_ns,
+        np.array([pan.position, tilt.position]),
+        np.array([pan.velocity, tilt.velocity]),
+    )
 
 
 class PostureJoin(Generic[Item]):
@@ -139,12 +147,8 @@ class PostureJoin(Generic[Item]):
     def _first_ready(self) -> int | None:
         if len(self._waiting) > self._depth:
             return 0
-        newest = self._history.newest
-        if newest is None:
+        newest_ns = self._history.newest_stamp_ns
+        if newest_ns is None:
             return None
         stamps = (stamp_ns for stamp_ns, _ in self._waiting)
-        return next((i for i, stamp_ns in enumerate(stamps) if stamp_ns <= newest.stamp_ns), None)
-
-
-def _ns(seconds: float) -> int:
-    return int(seconds * NS_PER_S)
+        return next((i for i, stamp_ns in enumerate(stamps) if stamp_ns <= newest_ns), None)

@@ -21,6 +21,7 @@ from importlib import metadata, resources
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,8 +46,8 @@ IMAGE_SIZE = (320, 240)
 _LARGEST_BYTES = 2**26
 _ASIDE_RAD = (0.35, 0.0)
 _MADE_BY = ('ja_common', 'ja_perception', 'ja_control', 'ja_sim')
-_LIBRARIES = ('mujoco', 'numpy', 'opencv-python-headless')
-_FILES = ('.py', '.npz', '.png', '.xml', '.yaml', '.tflite')
+_LIBRARIES = ('mujoco', 'numpy')
+_FILES = ('.py', '.npz', '.png', '.xml', '.yaml', '.onnx')
 
 
 @dataclass(frozen=True)
@@ -159,6 +160,8 @@ def _maker(scene: str, seed: int, count: int) -> dict[str, Any]:
         'count': count,
         'sources': _sha256(_sources()),
         **{library: metadata.version(library) for library in _LIBRARIES},
+        # Not by metadata: OpenCV comes in packages of several names.
+        'opencv': cv2.__version__,
     }
 
 

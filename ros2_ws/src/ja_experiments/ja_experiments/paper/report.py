@@ -12,6 +12,7 @@ from importlib import metadata, resources
 from pathlib import Path
 from typing import Any
 
+import cv2
 import yaml
 from jinja2 import Environment, StrictUndefined
 from markdown_it import MarkdownIt
@@ -26,7 +27,7 @@ from ja_experiments.paper.strips import image_strips
 from ja_experiments.paper.study import FEATURED_OBJECTS, OBJECTS, Study
 from ja_experiments.paper.tables import LOOKS, report_tables
 
-_LIBRARIES = ('numpy', 'numba', 'torch', 'mujoco', 'opencv-python-headless', 'scipy')
+_LIBRARIES = ('numpy', 'numba', 'torch', 'mujoco', 'scipy')
 _STRIP_ROWS = 3
 _STYLE = (
     'body{max-width:60rem;margin:2rem auto;padding:0 1rem;font:16px/1.5 system-ui,sans-serif}'
@@ -100,6 +101,8 @@ def _markdown(study: Study) -> str:
 
 def _versions() -> dict[str, str]:
     found = {library: metadata.version(library) for library in _LIBRARIES}
+    # Not by metadata: OpenCV comes in packages of several names.
+    found['opencv'] = cv2.__version__
     return {'Python': platform.python_version(), **found, 'machine': platform.machine()}
 
 

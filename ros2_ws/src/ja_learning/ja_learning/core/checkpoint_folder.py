@@ -65,18 +65,33 @@ class CheckpointFolder:
         """Let another process have the folder."""
         self._lock.close()
 
-    def save(self, learner: Learner) -> Path:
+    def save(self, learner: Learner, remove_old: bool = True) -> Path:
         """Write all that was learned, and return the path. Raises as `save_checkpoint`."""
         number = max(map(_number, self._newest_first()), default=0) + 1
         path = self.folder / f'{learner.kind}-{number:06d}.npz'
         save_checkpoint(path, learner.state(), _description(learner))
         self._saved_trials = learner.trials
         self._link(path)
-        ours = [other for other in self._newest_first() if _kind(other) == learner.kind]
-        for old in ours[self.config.checkpoints_kept :]:
-            with suppress(OSError):  # the new one is saved all the same
-                old.unlink()
+        if remove_old:
+            self._remove_old(learner.kind)
         return path
+
+    def save_reset(self, learner: Learner) -> Path:
+        """Write a learner that knows nothing, and keep what was learned before: see `go_back`."""
+        return self.save(learner, remove_old=False)
+
+    def go_back(self, learner: Learner) -> Resumed:
+        """Restore the newest checkpoint, but one with trials where there is one.
+
+        So what a reset has forgotten comes back. If it was not in the newest file it is saved
+        again, so that a restart goes on from it, too. Raises as `resume_into` and `save`.
+        """
+        found = self.resume_into(learner, with_trials=True)
+        if found.path is None:
+            return self.resume_into(learner)
+        if found.path != self._newest_first()[0]:
+            self.save(learner)
+        return found
 
     def save_when_due(self, learner: Learner) -> None:
         """Save if so many trials as configured were learned since the last time."""
@@ -88,22 +103,26 @@ class CheckpointFolder:
         if learner.trials != self._saved_trials:
             self.save(learner)
 
-    def resume_into(self, learner: Learner) -> Resumed:
+    def resume_into(self, learner: Learner, with_trials: bool = False) -> Resumed:
         """Restore the newest checkpoint that is whole and of this learner's configuration.
+
+        `with_trials`: pass over those of a learner without trials.
 
         Raises ConfigError, and changes nothing, when there are checkpoints and none can be used:
         an untrained learner must not replace a trained one unnoticed.
         """
-        refused = []
+        refused, passed_over = [], False
         for path in self._newest_first():
             try:
                 restore_checkpoint(path, learner)
             except (ValueError, OSError) as error:
                 refused.append(str(error))
-            else:
+                continue
+            if learner.trials or not with_trials:
                 self._saved_trials = learner.trials
                 return Resumed(path, refused)
-        if refused:
+            passed_over = True
+        if refused and not passed_over:
             raise ConfigError(
                 f'none of the {len(refused)} checkpoints in {self.folder} can be used; the newest:'
                 f' {refused[0]}: fix that, or name another folder'
@@ -113,6 +132,12 @@ class CheckpointFolder:
     def _newest_first(self) -> list[Path]:
         found = [path for path in self.folder.glob('*.npz') if _NAME.fullmatch(path.name)]
         return sorted(found, key=_number, reverse=True)
+
+    def _remove_old(self, kind: str) -> None:
+        ours = [path for path in self._newest_first() if _kind(path) == kind]
+        for old in ours[self.config.checkpoints_kept :]:
+            with suppress(OSError):  # the new one is saved all the same
+                old.unlink()
 
     def _link(self, path: Path) -> None:
         temporary = self.folder / f'.{LAST}.{os.getpid()}'

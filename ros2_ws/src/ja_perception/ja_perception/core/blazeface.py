@@ -6,9 +6,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ja_common.core.config import ConfigError
 from ja_perception.core.box import Box
 from ja_perception.core.faces import Face, cut_square
 
+_MODEL = 'blazeface_short_range.onnx'
 _INPUT = 128
 # The grids of the network's two heads: cells a side, anchors a cell.
 _GRIDS = ((16, 2), (8, 6))
@@ -26,18 +28,30 @@ def _anchor_centres() -> NDArray[np.float32]:
     return np.concatenate(grids)
 
 
+def _read_network() -> 'cv2.dnn.Net':
+    """Read the network, which is stored as ONNX: OpenCV reads TFLite from 4.8 on only."""
+    with as_file(files('ja_perception.models') / _MODEL) as path:
+        try:
+            return cv2.dnn.readNetFromONNX(str(path))
+        except (AttributeError, cv2.error):
+            # A build without the dnn module or without protobuf, or an old one.
+            raise ConfigError(
+                f'OpenCV {cv2.__version__} cannot read the face detector {_MODEL}: install OpenCV '
+                '4.6 or newer with its dnn module, or set face_finder to haar'
+            ) from None
+
+
 class BlazeFace:
     """The default face detector: about 2 ms a search on one core, heads turned up to 60 degrees.
 
-    ``least_score`` is the confidence (0-1) below which a face is not reported.
+    ``least_score`` is the confidence (0-1) below which a face is not reported. Raises ConfigError
+    if this OpenCV cannot read the network.
     """
 
     smallest_share = 0.2
 
     def __init__(self, least_score: float = 0.4) -> None:
-        model = files('ja_perception.models') / 'blazeface_short_range.tflite'
-        with as_file(model) as path:
-            self._net = cv2.dnn.readNetFromTFLite(str(path))
+        self._net = _read_network()
         self._outputs = ['classificators', 'regressors']
         self._anchors = _anchor_centres()
         self._least_logit = float(np.log(least_score / (1 - least_score)))

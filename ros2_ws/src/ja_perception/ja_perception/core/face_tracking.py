@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.config import Configuration, parameter
 from ja_common.core.geometry import angle_between, directions_of_rays, rays_of_directions
-from ja_common.core.posture import NS_PER_S
+from ja_common.core.stamps import NS_PER_S
 from ja_perception.core.box import Box
 from ja_perception.core.face_crop import FACE_COLUMNS, FACE_ROWS, crop_face
 from ja_perception.core.faces import Face, FaceFinder, suppress_non_maxima

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.config import Configuration, parameter
 from ja_common.core.geometry import head_rotation
-from ja_common.core.posture import NS_PER_S, Posture
+from ja_common.core.posture import Posture
+from ja_common.core.stamps import NS_PER_S
 from ja_perception.core.ego_motion import expected_image, rotation_homography
 from ja_perception.core.features import FeatureConfig, Mask, motion_map
 from ja_perception.core.undistortion import distort_mask, undistort_image

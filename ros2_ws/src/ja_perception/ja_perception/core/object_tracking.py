@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ja_common.core.config import Configuration, parameter
-from ja_common.core.posture import NS_PER_S
+from ja_common.core.stamps import NS_PER_S
 
 
 @dataclass(frozen=True)

@@ -19,16 +19,15 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, ChunkIndex, Footer, McapRecord, Message, Schema
 
-LARGEST_BYTES = 256 * 2**20
-"""Of a message, and of a chunk when it is unpacked. Recorders write chunks of some MB."""
+from ja_recording.core.storage import LARGEST_BYTES, DamagedError
 
 MOST_MESSAGES = 250_000
 """In one chunk: many tiny messages take more memory than their bytes."""
 
-_MAGIC = b'\x89MCAP0\r\n'
+MAGIC = b'\x89MCAP0\r\n'
 _HEAD = struct.Struct('<BQ')
 _MESSAGE = struct.Struct('<HIQQ')
-_FOOTER_BYTES = _HEAD.size + 20 + len(_MAGIC)
+_FOOTER_BYTES = _HEAD.size + 20 + len(MAGIC)
 _CRC_BYTES = 4
 _BLOCK_BYTES = 2**20
 # The records that are read, and how many bytes of each may be.
@@ -42,21 +41,21 @@ _KINDS: dict[int, tuple[Any, int]] = {
 }
 
 
-class DamagedError(Exception):
-    """A part of a file that cannot be used; the message says why."""
-
-
 class Record(NamedTuple):
     """One record and where it begins; a kind that is not needed has no content."""
 
     offset: int
-    content: McapRecord | None
+    opcode: int
+    content: McapRecord | None = None
 
 
-def records(stream: IO[bytes], size: int, offset: int = len(_MAGIC)) -> Iterator[Record]:
+def records(
+    stream: IO[bytes], size: int, offset: int = len(MAGIC), only_heads: bool = False
+) -> Iterator[Record]:
     """Yield the records of a file of so many bytes, from an offset on, up to the footer.
 
-    Raises DamagedError at the first that is cut short or unreadable.
+    `only_heads`: without their contents. Raises DamagedError at the first that is cut short or
+    unreadable.
     """
     while True:
         stream.seek(offset)
@@ -65,38 +64,34 @@ def records(stream: IO[bytes], size: int, offset: int = len(_MAGIC)) -> Iterator
         if end > size:
             raise DamagedError('it was cut short')
         content = None
-        if opcode in _KINDS:
+        if opcode in _KINDS and not only_heads:
             _check_length(opcode, length)
             content = _parsed(opcode, stream.read(length))
-        yield Record(offset, content)
+        yield Record(offset, opcode, content)
         if opcode == Opcode.FOOTER:
             return
         offset = end
 
 
-def is_mcap(stream: IO[bytes]) -> bool:
-    """Return whether a file begins as an MCAP file."""
-    stream.seek(0)
-    return stream.read(len(_MAGIC)) == _MAGIC
+def read_footer(stream: IO[bytes], size: int) -> Footer | None:
+    """Return the footer of a file; None where the file was not finished."""
+    if size < len(MAGIC) + _FOOTER_BYTES:
+        return None
+    stream.seek(size - len(MAGIC))
+    if stream.read() != MAGIC:
+        return None
+    try:
+        found = next(records(stream, size, size - _FOOTER_BYTES)).content
+    except DamagedError:
+        return None
+    return found if isinstance(found, Footer) else None
 
 
-def summary_offset(stream: IO[bytes], size: int) -> int:
-    """Return where the summary of a finished file begins.
-
-    Raises DamagedError where the file was not finished, or has no summary.
-    """
-    if size < len(_MAGIC) + _FOOTER_BYTES:
-        raise DamagedError('it was not finished')
-    stream.seek(size - len(_MAGIC))
-    if stream.read() != _MAGIC:
-        raise DamagedError('it was not finished')
-    found = next(records(stream, size, size - _FOOTER_BYTES)).content
-    if not isinstance(found, Footer) or not found.summary_start:
-        raise DamagedError('it has no summary')
-    end = size - len(_MAGIC) - _CRC_BYTES
-    if found.summary_crc not in (0, _checksum(stream, found.summary_start, end)):
+def check_summary(footer: Footer, stream: IO[bytes], size: int) -> None:
+    """Compare the checksum of a summary, where there is one. Raises DamagedError."""
+    end = size - len(MAGIC) - _CRC_BYTES
+    if footer.summary_crc not in (0, _checksum(stream, footer.summary_start, end)):
         raise DamagedError('the checksum of its summary is wrong')
-    return found.summary_start
 
 
 def records_in(chunk: Chunk) -> Iterator[McapRecord]:

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ja_common.core.config import Configuration, parameter
 from ja_common.core.geometry import finite_pair, head_rotation
-from ja_common.core.posture import NS_PER_S, Posture
+from ja_common.core.posture import Posture
+from ja_common.core.stamps import NS_PER_S
 
 # From the optical frame (x right, y down, z forward) to the head frame (x forward, y left, z up).
 _HEAD_FROM_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
@@ -57,6 +58,11 @@ class DigitalHead:
         """Return the greatest pan and tilt, (2,) [rad]: all of the wide picture can be centred."""
         half_width = math.tan(self._config.wide_view_rad / 2)
         return np.arctan([half_width, half_width * wide_height_px / wide_width_px])
+
+    @property
+    def target(self) -> NDArray[np.float64]:
+        """Return the servos' target (2,) [rad]."""
+        return self._target
 
     def command(self, posture: ArrayLike) -> None:
         """Set the servos' target (pan, tilt) [rad]. ValueError unless two finite numbers."""
