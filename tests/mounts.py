@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from ros_testing import PATIENCE_S
+
 _tried = subprocess.run(
     'unshare --mount mount -t tmpfs tmpfs /dev/shm',
     shell=True, capture_output=True, text=True, check=False,
@@ -38,5 +40,5 @@ def run_with_shared_memory(
     """Run a Python program with a fresh tmpfs at /dev/shm, as `with_shared_memory`."""
     command = with_shared_memory(options, [sys.executable, '-c', program], free_pages)
     return subprocess.run(
-        command, capture_output=True, text=True, check=False, cwd=cwd, timeout=60
+        command, capture_output=True, text=True, check=False, cwd=cwd, timeout=PATIENCE_S
     )

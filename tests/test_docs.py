@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from graph.test_rooms import MAY_IMPORT
+from ros_testing import PATIENCE_S
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / 'docs'
@@ -122,7 +123,7 @@ def test_a_page_is_read_in_five_minutes(name: str) -> None:
 
 def test_the_site_builds_without_warnings(tmp_path: Path) -> None:
     command = [sys.executable, '-m', 'mkdocs', 'build', '--strict', '--site-dir', str(tmp_path)]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE_S)
     assert done.returncode == 0, done.stdout + done.stderr
     reference = (tmp_path / 'reference' / 'ja_control.core.command_guard.html').read_text()
     assert 'CommandGuard' in reference

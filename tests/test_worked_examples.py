@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from ros_testing import PATIENCE_S
+
 TESTS = Path(__file__).parent
 PAGES = sorted((TESTS.parent / 'docs' / 'change_it').glob('a_new_*.md'))
 # A block of Python whose first line names the file that it is.
@@ -29,7 +31,7 @@ def test_the_code_of_a_page_passes_its_own_tests(page: Path, tmp_path: Path) -> 
         env={**os.environ, 'PYTHONPATH': f'{tmp_path}{os.pathsep}{TESTS}'},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE_S,
     )
     assert done.returncode == 0, done.stdout + done.stderr
 

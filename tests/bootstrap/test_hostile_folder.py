@@ -10,6 +10,7 @@ import pytest
 from bootstrap.machine import clean_environ, probe_python
 from bootstrap.setup_environment import Environment
 from hostile_folder import imported_from, make_hostile
+from ros_testing import PATIENCE_S
 
 ROOT = Path(__file__).parents[2]
 
@@ -17,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 def run(command: list[str], folder: Path, **environ: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         command, cwd=folder, env={**clean_environ(os.environ), **environ},
-        capture_output=True, text=True, timeout=120,
+        capture_output=True, text=True, timeout=PATIENCE_S,
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ import pytest
 from rclpy.node import Node
 
 from ja_common.executor import CachedWaitSetExecutor
-from ros_testing import spin_until
+from ros_testing import PATIENCE_S, spin_until
 
 SOURCES = Path(__file__).parents[2] / 'ros2_ws' / 'src'
 IN_WORKSPACE = 'source install/setup.bash && exec "$@"'
@@ -65,7 +65,7 @@ def test_a_node_of_the_built_workspace_runs(tmp_path, environ, ros_context):
         spin_until(executor, lambda: ('gate', '/built') in watcher.get_node_names_and_namespaces())
     finally:
         gate.send_signal(signal.SIGINT)
-        errors = gate.communicate(timeout=10)[1]
+        errors = gate.communicate(timeout=PATIENCE_S)[1]
         executor.shutdown()
         watcher.destroy_node()
     assert gate.returncode == 0

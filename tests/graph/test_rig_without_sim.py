@@ -19,7 +19,7 @@ from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.topics import DETECTIONS, IMAGE, JOINT_STATES
 from ja_runner.graph import rig_graph
 from ja_runner.parts import PART_OF
-from ros_testing import spin_until
+from ros_testing import PATIENCE_S, spin_until
 
 OUR_PACKAGES = [package for packages in PARTS.values() for package in packages]
 LIBRARIES = ['mujoco', 'gymnasium', 'nicegui', 'fastapi', 'uvicorn', 'distributed']
@@ -108,8 +108,8 @@ def test_all_nodes_of_a_rig_start_and_process_images(options, environ, fake_rig,
         return expected <= seen and rig.detections > 3
 
     try:
-        spin_until(executor, all_started, 60.0)
-        spin_until(executor, lambda: process.poll() is not None, 60.0)
+        spin_until(executor, all_started)
+        spin_until(executor, lambda: process.poll() is not None)
     finally:
         process.kill()
         output, _ = process.communicate()
@@ -122,7 +122,7 @@ def test_all_nodes_of_a_rig_start_and_process_images(options, environ, fake_rig,
 @pytest.mark.parametrize('command', [[], ['rig'], ['demo'], ['bench'], ['figures'], ['doctor']])
 def test_the_help_pages_need_no_part(command, environ, tmp_path):
     process = ja(environ, tmp_path, *command, '--help')
-    output, _ = process.communicate(timeout=60)
+    output, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, output
     assert 'Usage' in output
 
@@ -141,7 +141,7 @@ def test_the_help_pages_need_no_part(command, environ, tmp_path):
 )
 def test_a_command_that_needs_a_missing_part_says_so(command, package, environ, tmp_path):
     process = ja(environ, tmp_path, *command)
-    output, _ = process.communicate(timeout=60)
+    output, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 2
     assert output.startswith(f'error: {package} is not installed'), output
     assert output.count('\n') == 1

@@ -14,6 +14,7 @@ import pytest
 from ja_learning.core.checkpoint import load_checkpoint
 from ja_runner.node_process import NodeProcess
 from ja_runner.node_spec import NodeSpec
+from ros_testing import PATIENCE_S
 
 pytestmark = pytest.mark.usefixtures('domain')
 
@@ -35,7 +36,7 @@ def end_at_random(random_: random.Random, spec: NodeSpec, log: Path, latest_s: f
         if random_.random() < 0.3:
             time.sleep(random_.uniform(0, 0.3))
             process.send_signal(random_.choice(STOPS))
-        process.popen.wait(timeout=60)
+        process.popen.wait(timeout=PATIENCE_S)
     finally:
         process.send_signal(signal.SIGKILL)
         process.close()
@@ -51,7 +52,7 @@ def end_demo_at_random(random_: random.Random, folder: Path, latest_s: float) ->
     )  # fmt: skip
     time.sleep(random_.uniform(0.5, latest_s))
     demo.send_signal(random_.choice(STOPS))
-    output, _ = demo.communicate(timeout=120)
+    output, _ = demo.communicate(timeout=PATIENCE_S)
     check_log(output + '\n'.join(path.read_text() for path in folder.glob('runs/*/log/*.log')))
     assert 'did not end on' not in output
     assert processes_with_environment('JA_TEST_OF_SIGNALS', str(folder)) == []

@@ -17,6 +17,7 @@ import psutil
 import pytest
 
 from ja_learning.core.checkpoint import load_checkpoint
+from ros_testing import PATIENCE_S
 
 pytestmark = pytest.mark.usefixtures('domain')
 
@@ -56,7 +57,7 @@ def logs(folder: Path) -> str:
 )
 def test_the_demo_runs_to_its_end(options, tmp_path):
     process = start(tmp_path, 'demo', '--trials', '3', *options)
-    output, _ = process.communicate(timeout=90)
+    output, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, output
     assert 'Traceback' not in output + logs(tmp_path)
     assert 'practice, last trials' in output
@@ -73,7 +74,7 @@ def test_the_demo_runs_to_its_end(options, tmp_path):
 
 def test_a_run_that_left_nothing_cannot_be_resumed(tmp_path):
     process = start(tmp_path, 'demo', '--resume', 'runs')
-    output, _ = process.communicate(timeout=30)
+    output, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 2
     assert output == 'error: runs cannot be resumed: there is no checkpoint in runs/checkpoints\n'
 
@@ -81,7 +82,7 @@ def test_a_run_that_left_nothing_cannot_be_resumed(tmp_path):
 @pytest.mark.slow
 def test_a_demo_is_resumed_where_it_ended(tmp_path):
     first = start(tmp_path, 'demo', '--trials', '10', '--exam', '0', '--one-process')
-    output, _ = first.communicate(timeout=90)
+    output, _ = first.communicate(timeout=PATIENCE_S)
     assert first.returncode == 0, output
     [run] = tmp_path.glob('runs/*-demo')
     trials = int((run / 'trials').read_text())
@@ -89,7 +90,7 @@ def test_a_demo_is_resumed_where_it_ended(tmp_path):
 
     options = ['--trials', '5', '--exam', '0', '--resume', str(run)]
     second = start(tmp_path, 'demo', *options)
-    output, _ = second.communicate(timeout=90)
+    output, _ = second.communicate(timeout=PATIENCE_S)
     assert second.returncode == 0, output
     assert f'goes on from {run / "checkpoints"}' in logs(tmp_path)
     assert int((run / 'trials').read_text()) >= trials + 5
@@ -100,7 +101,9 @@ def trials_learned(run: Path) -> int:
     return load_checkpoint(run / 'checkpoints' / 'last.npz')[1]['trials']
 
 
-def wait_for_log(folder: Path, process: subprocess.Popen, timeout_s: float = 30.0) -> list[int]:
+def wait_for_log(
+    folder: Path, process: subprocess.Popen, timeout_s: float = PATIENCE_S
+) -> list[int]:
     """Wait until every node of the graph runs as a process; return their ids."""
     end = time.monotonic() + timeout_s
     while (
@@ -117,7 +120,7 @@ def test_a_signal_ends_the_demo_cleanly_even_while_it_starts(number, tmp_path):
     process = start(tmp_path, 'demo')
     pids = wait_for_log(tmp_path, process)
     process.send_signal(number)
-    output, _ = process.communicate(timeout=30)
+    output, _ = process.communicate(timeout=PATIENCE_S)
     # Code 0 promises a finished trial.
     assert process.returncode == int('no trial was finished' in output), output
     assert 'Traceback' not in output + logs(tmp_path)
@@ -128,7 +131,7 @@ def test_a_killed_node_ends_the_demo_with_its_name(tmp_path):
     process = start(tmp_path, 'demo')
     pids = wait_for_log(tmp_path, process)
     os.kill(named(pids)['ja_learning.learning_module_node'], signal.SIGKILL)
-    output, _ = process.communicate(timeout=30)
+    output, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1
     assert 'learning_module was killed by SIGKILL' in output
     assert 'Traceback' not in output + logs(tmp_path)
@@ -139,7 +142,7 @@ def test_a_bad_parameter_file_gives_one_clear_error(tmp_path):
     bad = tmp_path / 'bad.yaml'
     bad.write_text('/**:\n  ros__parameters:\n    max_shifts: many\n')
     process = start(tmp_path, 'demo', '--ros-args', '--params-file', str(bad))
-    output, _ = process.communicate(timeout=60)
+    output, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1
     assert '/gate: ' in output
     assert "max_shifts = 'many' is a str" in output
@@ -148,7 +151,7 @@ def test_a_bad_parameter_file_gives_one_clear_error(tmp_path):
 
 def test_a_missing_parameter_file_is_named(tmp_path):
     process = start(tmp_path, 'demo', '--ros-args', '--params-file', 'nowhere.yaml')
-    output, _ = process.communicate(timeout=60)
+    output, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 2
     assert 'nowhere.yaml' in output
     assert 'Traceback' not in output
@@ -161,14 +164,14 @@ def test_the_live_page_is_served_beside_the_graph_and_ends_with_it(tmp_path):
     page = wait_for_page(address)
     assert 'Joint attention' in page
     process.send_signal(signal.SIGINT)
-    output, _ = process.communicate(timeout=30)
+    output, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == int('no trial was finished' in output), output
     assert 'Traceback' not in output + logs(tmp_path)
     with pytest.raises(URLError):
         urlopen(address, timeout=1)
 
 
-def wait_for_page(address: str, timeout_s: float = 40.0) -> str:
+def wait_for_page(address: str, timeout_s: float = PATIENCE_S) -> str:
     end = time.monotonic() + timeout_s
     while True:
         try:
@@ -186,6 +189,6 @@ def test_the_rig_runs_on_a_folder_of_images(composition, tmp_path):
     cv2.circle(picture, (400, 200), 40, (0, 0, 255), -1)
     cv2.imwrite(str(pictures / 'a.png'), picture)
     process = start(tmp_path, 'rig', '--source', str(pictures), '--time', '1', *composition)
-    output, _ = process.communicate(timeout=60)
+    output, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, output
     assert 'Traceback' not in output + logs(tmp_path)

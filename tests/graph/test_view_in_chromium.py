@@ -20,6 +20,8 @@ import numpy as np
 import pytest
 from nicegui import __version__
 
+from ros_testing import PATIENCE_S
+
 CHROMIUM, DRIVER = shutil.which('chromium'), shutil.which('chromedriver')
 
 pytestmark = [
@@ -73,7 +75,7 @@ def demo(domain: int, tmp_path: Path) -> Iterator[tuple[str, int]]:
         raise AssertionError(f'the demo ended without an address: {"".join(lines)}')
     yield lines[-1].split('live page: ')[1].strip(), process.pid
     process.send_signal(signal.SIGINT)
-    output, _ = process.communicate(timeout=60)
+    output, _ = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, output
 
 
@@ -87,7 +89,7 @@ def page(request, domain: int, tmp_path: Path) -> Iterator[str]:
     )  # fmt: skip
     yield process.stdout.readline().split('live page: ')[1].strip()
     process.send_signal(signal.SIGINT)
-    process.communicate(timeout=60)
+    process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0
 
 
@@ -146,7 +148,7 @@ def browse() -> Iterator[Callable]:
         browser.quit()
 
 
-def wait(condition: Callable[[], object], timeout_s: float = 60.0) -> None:
+def wait(condition: Callable[[], object], timeout_s: float = PATIENCE_S) -> None:
     end = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < end, f'not within {timeout_s:g} s'

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from ros_testing import PATIENCE_S
+
 JA = [sys.executable, '-m', 'ja_bringup.cli']
 
 
 def ja(folder: Path, *args: str, **more) -> subprocess.CompletedProcess:
     return subprocess.run(
-        [*JA, *args], cwd=folder, text=True, stderr=subprocess.PIPE, timeout=120, **more
+        [*JA, *args], cwd=folder, text=True, stderr=subprocess.PIPE, timeout=PATIENCE_S, **more
     )
 
 

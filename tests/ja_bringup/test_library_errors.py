@@ -8,6 +8,7 @@ import pytest
 
 from ja_bringup import cli
 from ja_common.core.config import ConfigError
+from ros_testing import PATIENCE_S
 
 
 def test_a_library_that_refuses_another_is_one_sentence(tmp_path):
@@ -20,7 +21,7 @@ def test_a_library_that_refuses_another_is_one_sentence(tmp_path):
     ended = subprocess.run(
         [sys.executable, '-m', 'ja_bringup.cli', 'export', 'libraries', '--to', 'made'],
         cwd=tmp_path, env={**os.environ, 'PYTHONPATH': path}, capture_output=True, text=True,
-        timeout=120, check=False,
+        timeout=PATIENCE_S, check=False,
     )  # fmt: skip
     assert ended.returncode == 2
     assert ended.stderr.startswith(f'error: {why}; install versions that fit together: ')

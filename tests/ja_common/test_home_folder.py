@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from ja_common.core.home_folder import replace_missing_home
+from ros_testing import PATIENCE_S
 
 NAMES = {'ROS_LOG_DIR', 'NUMBA_CACHE_DIR', 'MPLCONFIGDIR'}
 
@@ -70,6 +71,10 @@ def test_a_node_starts_without_a_home(domain, tmp_path):
         'spin_node(make)\n'
     )
     node = subprocess.run(
-        [sys.executable, '-c', code], env=environ, capture_output=True, text=True, timeout=60
+        [sys.executable, '-c', code],
+        env=environ,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
     )
     assert (node.returncode, node.stdout, node.stderr) == (0, 'made\n', '')

@@ -7,6 +7,8 @@ import sys
 
 import pytest
 
+from ros_testing import PATIENCE_S
+
 PROGRAM = """
 import json, os
 from concurrent.futures import ThreadPoolExecutor
@@ -33,7 +35,11 @@ else:
 
 def test_all_threads_are_real_time_but_those_that_use_default_scheduling():
     ran = subprocess.run(
-        [sys.executable, '-c', PROGRAM], capture_output=True, text=True, timeout=60, check=True
+        [sys.executable, '-c', PROGRAM],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=True,
     )
     result = json.loads(ran.stdout)
     if isinstance(result, str):

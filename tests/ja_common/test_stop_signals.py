@@ -10,9 +10,10 @@ import time
 import pytest
 
 from ja_common.stop_signals import STOP_SIGNALS, StopSignals
+from ros_testing import PATIENCE_S
 
 
-def wait_for(condition, timeout_s=10.0):
+def wait_for(condition, timeout_s=PATIENCE_S):
     end = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < end
@@ -27,7 +28,7 @@ def test_a_signal_is_a_request_and_the_handlers_come_back(number):
         stop.call_at_request(woken.set)
         stop.raise_if_requested()
         os.kill(os.getpid(), number)
-        assert woken.wait(10.0)
+        assert woken.wait(PATIENCE_S)
         assert stop.requested
         with pytest.raises(KeyboardInterrupt):
             stop.raise_if_requested()
@@ -99,5 +100,5 @@ def test_a_second_signal_ends_a_process_that_hangs():
     assert process.stdout.readline() == 'asked\n'
     time.sleep(0.2)
     process.send_signal(signal.SIGTERM)
-    assert process.wait(timeout=30) == 128 + signal.SIGTERM
+    assert process.wait(timeout=PATIENCE_S) == 128 + signal.SIGTERM
     process.stdout.close()

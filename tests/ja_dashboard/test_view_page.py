@@ -17,6 +17,7 @@ from ja_dashboard.core.view_model import NodeHealth, RunState, State
 from ja_dashboard.image_feed import Picture
 from ja_dashboard.page import PICTURE_URL, Page, facts_html, nodes_html
 from ja_dashboard.server import picture_app
+from ros_testing import PATIENCE_S
 
 
 def browse(model: FakeModel, steps: Callable[[User], Awaitable[None]]) -> None:
@@ -28,7 +29,7 @@ def browse(model: FakeModel, steps: Callable[[User], Awaitable[None]]) -> None:
     asyncio.run(visit())
 
 
-async def until(condition: Callable[[], object], timeout_s: float = 10.0) -> None:
+async def until(condition: Callable[[], object], timeout_s: float = PATIENCE_S) -> None:
     """Let the page run until the condition holds."""
     end_s = asyncio.get_running_loop().time() + timeout_s
     while not condition():

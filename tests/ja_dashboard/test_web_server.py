@@ -14,6 +14,7 @@ from nicegui import __version__
 
 import fake_page
 from ja_dashboard.page import PICTURE_URL
+from ros_testing import PATIENCE_S
 
 SOCKET_URL = '/_nicegui_ws/socket.io/?EIO=4&transport=websocket'
 POLLING_URL = '/_nicegui_ws/socket.io/?EIO=4&transport=polling'
@@ -54,7 +55,7 @@ def open_to_others() -> Iterator[str]:
 def send(address: str, *lines: str) -> str:
     """Send the lines of a request; return the answer, of a socket its head."""
     at = urlsplit(address)
-    with socket.create_connection((at.hostname, at.port), timeout=30) as connection:
+    with socket.create_connection((at.hostname, at.port), timeout=PATIENCE_S) as connection:
         connection.sendall('\r\n'.join([*lines, '', '']).encode('latin-1'))
         answer = b''
         while b'\r\n\r\n' not in answer or b' 101 ' not in answer:

@@ -13,6 +13,7 @@ import pytest
 from ja_common.middleware import load_middleware
 from ja_diagnostics import doctor, image_stream
 from ja_diagnostics.doctor import (
+from ros_testing import PATIENCE_S
     check_ports,
     check_python,
     check_rclpy,
@@ -60,7 +61,7 @@ def test_a_middleware_that_is_not_installed_is_a_finding_and_not_the_end():
 @pytest.mark.usefixtures('missing_middleware')
 def test_a_command_ends_with_one_sentence_where_the_middleware_is_not_installed():
     command = [sys.executable, '-m', 'ja_bringup', 'topics']
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S)
     assert ended.returncode == 2
     (line,) = ended.stderr.splitlines()
     assert line.startswith('error: RMW_IMPLEMENTATION=rmw_of_another_lab_cpp cannot be loaded')

@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from ja_diagnostics.faults import hosts
+from ros_testing import PATIENCE_S
 
 NEAR = """
 import sys
@@ -42,7 +43,7 @@ def run_near(for_s: float, **environ: str) -> tuple[dict[str, list[str]], int]:
     inherited = {name: value for name, value in os.environ.items() if name not in names}
     command = ['unshare', '--net', '--mount', sys.executable, '-c', NEAR, str(for_s)]
     ran = subprocess.run(
-        command, capture_output=True, text=True, check=True, timeout=60,
+        command, capture_output=True, text=True, check=True, timeout=PATIENCE_S,
         env={**inherited, **environ},
     )  # fmt: skip
     found, calls = ran.stdout.splitlines()

@@ -18,6 +18,7 @@ from ja_experiments.sweep import _key as cell_key
 from ja_experiments.sweep import run_cell, run_sweep
 from ja_experiments.sweep_grid import Grid, read_grid
 from ja_sim.core.specs import ObjectsSpec
+from ros_testing import PATIENCE_S
 
 TRIALS = 30_000
 
@@ -165,7 +166,7 @@ def test_a_killed_worker_and_a_killed_sweep_lose_only_their_current_cells(
         again.start()
         wait_for_cells(tmp_path, len(kept) + 1)
         os.kill(cluster.workers[0].pid, signal.SIGKILL)
-        again.join(timeout=120)
+        again.join(timeout=PATIENCE_S)
         assert again.exitcode == 0
 
     assert kept.items() <= cell_files(tmp_path).items(), 'finished cells were run again'

@@ -28,7 +28,7 @@ from ja_common.topics import (
     TARGET,
 )
 from ja_perception.salient_feature_detector_node import SalientFeatureDetectorNode
-from ros_testing import spin_until
+from ros_testing import PATIENCE_S, spin_until
 from synthetic_pictures import draw_ball, draw_face, room
 
 FOCAL_PX = 492.4  # 320 px across 36 degrees
@@ -62,7 +62,7 @@ class Rig:
         self.node.create_subscription(topic.type, topic.name, keep, topic.publisher_qos)
         self.wait(lambda: self.node.count_publishers(topic.name))
 
-    def wait(self, condition, timeout_s=10.0):
+    def wait(self, condition, timeout_s=PATIENCE_S):
         spin_until(self.executor, condition, timeout_s)
 
     def all_of(self, topic):

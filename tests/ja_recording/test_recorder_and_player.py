@@ -30,6 +30,7 @@ from ja_recording.player_node import PlayerNode
 from ja_recording.recorder_node import RecorderNode
 from ja_recording.recording_folder import Limits, RecordingFolder
 from recordings import T0_NS, channel_of, write_recording
+from ros_testing import PATIENCE_S
 
 ALWAYS_PUBLISHED = '^/(rosout|parameter_events|diagnostics)$'
 
@@ -91,7 +92,7 @@ def test_it_survives_kill_9_up_to_the_last_second(make_bench, tmp_path):
         bench.wait(lambda: len(rates_in(folder)) == 50)
     finally:
         process.send_signal(signal.SIGKILL)
-        process.wait(timeout=10)
+        process.wait(timeout=PATIENCE_S)
     assert rates_in(folder) == [float(value) for value in range(50)]
     assert Recording(folder).unfinished
     bench.node.writer.close()

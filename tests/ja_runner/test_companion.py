@@ -8,6 +8,7 @@ import pytest
 
 from ja_runner.companion import Companion
 from ja_runner.node_spec import NodeSpec
+from ros_testing import PATIENCE_S
 
 TALKER = NodeSpec('dummy_nodes', 'talker')
 STUBBORN = NodeSpec('dummy_nodes', 'stubborn')
@@ -48,7 +49,7 @@ def test_one_that_ignores_signals_is_killed_with_the_context(tmp_path, monkeypat
     with Companion(STUBBORN, tmp_path, reports.append, announcement='[ERROR]') as companion:
         report_until(companion, lambda: reports)  # it ignores SIGINT from here on
         popen = companion._process.popen
-    assert popen.wait(5.0) == -signal.SIGKILL
+    assert popen.wait(PATIENCE_S) == -signal.SIGKILL
 
 
 def test_it_ends_with_the_context(tmp_path):

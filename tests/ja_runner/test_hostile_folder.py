@@ -5,6 +5,7 @@ import subprocess
 
 from hostile_folder import imported_from, make_hostile
 from ja_runner.node_spec import NodeSpec
+from ros_testing import PATIENCE_S
 
 
 def test_a_node_imports_nothing_from_the_current_folder(tmp_path):
@@ -13,7 +14,7 @@ def test_a_node_imports_nothing_from_the_current_folder(tmp_path):
     gate = NodeSpec('ja_control', 'gate', {'gating': 'nonsense'})
     done = subprocess.run(
         gate.command(), cwd=hostile, env={**os.environ, 'ROS_LOG_DIR': str(tmp_path)},
-        capture_output=True, text=True, timeout=60,
+        capture_output=True, text=True, timeout=PATIENCE_S,
     )  # fmt: skip
     assert 'nonsense' in done.stderr + done.stdout
     assert imported_from(hostile) == []

@@ -12,6 +12,7 @@ from std_msgs.msg import String
 
 from ja_runner.node_spec import NodeSpec
 from ja_runner.one_process import run_in_one_process
+from ros_testing import PATIENCE_S
 
 pytestmark = pytest.mark.usefixtures('domain')
 
@@ -39,7 +40,7 @@ GRAPH = [
 ]
 
 
-def within(condition: Callable[[], bool], timeout_s: float = 20.0) -> Callable[[], bool]:
+def within(condition: Callable[[], bool], timeout_s: float = PATIENCE_S) -> Callable[[], bool]:
     """Return the condition, which raises AssertionError after `timeout_s` [s]."""
     end_s = time.monotonic() + timeout_s
 

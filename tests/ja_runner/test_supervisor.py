@@ -20,6 +20,7 @@ from ja_common.executor import CachedWaitSetExecutor
 from ja_runner import node_process
 from ja_runner.node_spec import NodeSpec
 from ja_runner.supervisor import Supervision, Supervisor
+from ros_testing import PATIENCE_S
 
 pytestmark = pytest.mark.usefixtures('domain')
 
@@ -29,7 +30,7 @@ HANGING = NodeSpec('dummy_nodes', 'talker', {'text': 'hang'})
 STUBBORN = NodeSpec('dummy_nodes', 'stubborn')
 
 
-def wait_for(condition: Callable[[], object], timeout_s: float = 15.0) -> None:
+def wait_for(condition: Callable[[], object], timeout_s: float = PATIENCE_S) -> None:
     end = time.monotonic() + timeout_s
     while not condition():
         assert time.monotonic() < end, 'condition not met in time'
@@ -51,7 +52,7 @@ class SupervisedRun:
         self.supervisor = Supervisor(graph, folder, Supervision(**options), self.reports.append)
         self.pids: set[int] = set()
 
-    def until(self, condition: Callable[[], object], timeout_s: float = 15.0) -> int:
+    def until(self, condition: Callable[[], object], timeout_s: float = PATIENCE_S) -> int:
         end = time.monotonic() + timeout_s
 
         def tick() -> bool:
@@ -151,7 +152,7 @@ def test_a_hung_node_is_killed_and_replaced(hang, tmp_path):
                 process.send_signal(signal.SIGSTOP)
         return bool(first) and process.popen.pid != first[0]
 
-    assert run.until(replaced, timeout_s=60.0) == 0
+    assert run.until(replaced) == 0
     assert re.search(
         r'talker was hung, without a heartbeat for \d+ s, and was killed', run.reports[0]
     )
@@ -161,7 +162,7 @@ def test_a_hung_node_is_killed_and_replaced(hang, tmp_path):
 
 def test_a_hung_node_ends_a_graph_that_restarts_nothing(tmp_path):
     run = SupervisedRun([HANGING], tmp_path, hung_after_s=2.0)
-    assert run.until(lambda: False, timeout_s=60.0) == 1
+    assert run.until(lambda: False) == 1
     assert 'was hung' in run.reports[0]
     assert not any(map(alive, run.pids))
 
@@ -169,7 +170,7 @@ def test_a_hung_node_ends_a_graph_that_restarts_nothing(tmp_path):
 def test_a_node_that_never_comes_to_life_is_hung(tmp_path, monkeypatch):
     monkeypatch.setattr(node_process, 'START_LIMIT_S', 2.0)
     run = SupervisedRun([STUBBORN], tmp_path)
-    assert run.until(lambda: False, timeout_s=60.0) == 1
+    assert run.until(lambda: False) == 1
     assert 'stubborn was hung' in run.reports[-1]
     assert not any(map(alive, run.pids))
 
@@ -198,7 +199,7 @@ def test_a_halt_of_the_supervisor_makes_no_node_hung(tmp_path):
         ticks += ticks > 0
         return ticks > 50
 
-    assert run.until(halted_with_its_nodes, timeout_s=60.0) == 0
+    assert run.until(halted_with_its_nodes) == 0
     assert run.reports == []
 
 
@@ -275,7 +276,7 @@ def test_no_orphans_however_the_supervisor_ends(number, tmp_path):
     assert len(pids) == 2
     assert all(map(alive, pids))
     process.send_signal(number)
-    _, errors = process.communicate(timeout=15)
+    _, errors = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == (-number if number == signal.SIGKILL else 0)
     assert errors == ''
     wait_for(lambda: not any(map(alive, pids)))

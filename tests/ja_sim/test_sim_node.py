@@ -25,6 +25,7 @@ from ja_common.topics import (
 from ja_sim.sim_node import SimNode
 from ja_sim.truth_codec import decode_truth
 from node_bench import joint_state
+from ros_testing import PATIENCE_S
 
 PERIOD_NS = 100_000_000
 SIZE = {'image_width': 64, 'image_height': 48}
@@ -290,7 +291,7 @@ def test_world_that_cannot_be_made_is_one_clear_error(ros_context, parameters, t
 def test_a_program_that_ends_without_destroying_the_node_ends_quietly(domain):
     program = 'import rclpy\nfrom ja_sim.sim_node import SimNode\nrclpy.init()\nnode = SimNode()\n'
     done = subprocess.run(
-        [sys.executable, '-c', program], capture_output=True, text=True, timeout=60
+        [sys.executable, '-c', program], capture_output=True, text=True, timeout=PATIENCE_S
     )
     assert done.returncode == 0
     assert 'Traceback' not in done.stderr

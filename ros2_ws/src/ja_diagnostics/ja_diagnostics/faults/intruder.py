@@ -20,7 +20,7 @@ _TYPE = 'std_srvs/srv/SetBool'
 
 
 def try_to_enter(for_s: float) -> dict[str, list[str]]:
-    """Try until a service obeys, for so many seconds at most.
+    """Try until a node is found and a service obeys, for so many seconds at most.
 
     Returns the `nodes` found, and the services that `obeyed`.
     """
@@ -32,7 +32,8 @@ def try_to_enter(for_s: float) -> dict[str, list[str]]:
         answers: dict[str, Future] = {}
         obeyed: list[str] = []
         end_s = time.monotonic() + for_s
-        while not obeyed and time.monotonic() < end_s:
+        # A name may come after the endpoints of its node.
+        while not (nodes and obeyed) and time.monotonic() < end_s:
             executor.spin_once(timeout_sec=0.1)
             nodes |= set(node.get_node_names()) - {node.get_name()}
             for name, types in node.get_service_names_and_types():
