@@ -30,7 +30,9 @@ def main(root: Path, args: Sequence[str]) -> None:
         sys.exit(130)
     if testing:
         os.chdir(root)
-        command = ['-m', 'pytest', *args[1:]]
+        # All tests: in as many processes as there are processors. Chosen ones: as they are.
+        parallel = [] if args[1:] else ['-n', 'auto', '--maxprocesses', '4']
+        command = ['-m', 'pytest', *parallel, *args[1:]]
     elif documenting:
         os.chdir(root)
         command = ['-m', 'tools.build_docs', *args[1:]]

@@ -13,7 +13,6 @@ import pytest
 from ja_common.middleware import load_middleware
 from ja_diagnostics import doctor, image_stream
 from ja_diagnostics.doctor import (
-from ros_testing import PATIENCE_S
     check_ports,
     check_python,
     check_rclpy,
@@ -21,6 +20,7 @@ from ros_testing import PATIENCE_S
     check_stale_segments,
     checks,
 )
+from ros_testing import PATIENCE_S
 
 
 def test_every_check_has_the_name_of_its_finding(domain):
