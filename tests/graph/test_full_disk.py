@@ -13,9 +13,9 @@ from ja_runner.graph import sim_graph
 from ja_runner.node_spec import NodeSpec
 from ja_runner.one_process import run_in_one_process
 from ja_runner.progress import ProgressNode
+from ros_testing import PATIENCE_S
 
 MORE_TRIALS = 5
-PATIENCE_S = 60.0
 
 pytestmark = pytest.mark.usefixtures('domain')
 

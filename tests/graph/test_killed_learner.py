@@ -18,10 +18,10 @@ from ja_common.topics import DIAGNOSTICS
 from ja_runner.graph import sim_graph
 from ja_runner.node_spec import NodeSpec
 from ja_runner.supervisor import Supervision, Supervisor
+from ros_testing import PATIENCE_S
 
 KILLS = 2
 EVERY_TRIALS = 3
-PATIENCE_S = 60.0
 
 pytestmark = [pytest.mark.usefixtures('domain'), pytest.mark.slow]
 

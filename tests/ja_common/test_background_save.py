@@ -5,8 +5,7 @@ import threading
 import pytest
 
 from ja_common.core.background_save import BackgroundSave
-
-PATIENCE_S = 10.0
+from ros_testing import PATIENCE_S
 
 
 class Disk:

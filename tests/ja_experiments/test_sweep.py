@@ -43,7 +43,7 @@ def cell_files(folder: Path) -> dict[Path, int]:
 
 
 def wait_for_cells(folder: Path, count: int) -> None:
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + PATIENCE_S
     while len(cell_files(folder)) < count:
         assert time.monotonic() < deadline, 'no cell was finished in time'
         time.sleep(0.01)

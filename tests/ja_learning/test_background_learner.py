@@ -9,8 +9,7 @@ from ja_learning.core.background_learner import BackgroundLearner
 from ja_learning.core.gaze_line import GazeLineLearner
 from ja_learning.core.gaze_line_config import GazeLineConfig
 from made_up_trials import trial
-
-PATIENCE_S = 10.0
+from ros_testing import PATIENCE_S
 
 
 class SlowLearner:

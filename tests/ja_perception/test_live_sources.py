@@ -14,6 +14,7 @@ from ja_perception.core.frame_sources import NotYetError, SourceError, SourceOpt
 from ja_perception.core.live_sources import Stream, shown_url
 from ja_perception.core.open_source import open_source
 from picture_files import flat, write_film
+from ros_testing import PATIENCE_S
 
 RED, GREEN = (200, 0, 0), (0, 200, 0)
 
@@ -86,7 +87,7 @@ def test_a_live_stream_is_opened_again_when_it_breaks_off(server):
     assert isinstance(source, Stream)
     assert 'secret' not in source.summary
     before = QuietHandler.connections
-    deadline_s = time.monotonic() + 60
+    deadline_s = time.monotonic() + PATIENCE_S
     while QuietHandler.connections == before:
         assert np.abs(next_picture(source)[24, 32].astype(int) - GREEN).max() < 10
         assert time.monotonic() < deadline_s

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures('domain')
 
 
 def report_until(companion: Companion, condition: Callable[[], object]) -> None:
-    end = time.monotonic() + 20.0
+    end = time.monotonic() + PATIENCE_S
     while not condition():
         assert time.monotonic() < end
         companion.report_events()
