@@ -62,7 +62,7 @@ def server(tmp_path):
     server.server_close()
 
 
-def next_picture(source, timeout_s=30.0):
+def next_picture(source, timeout_s=PATIENCE_S):
     deadline_s = time.monotonic() + timeout_s
     while time.monotonic() < deadline_s:
         try:
@@ -123,7 +123,7 @@ def test_a_camera_that_stays_away_is_named_with_its_reason(monkeypatch):
     assert 'the camera refuses' in text
 
 
-def error_of(source, timeout_s=30.0):
+def error_of(source, timeout_s=PATIENCE_S):
     deadline_s = time.monotonic() + timeout_s
     while time.monotonic() < deadline_s:
         try:
