@@ -197,5 +197,5 @@ class _Limits:
         if rate > 0.0:
             rates.append(self._bound(rate, source))
         else:
-            # MoveIt takes it so as well: the attribute is required, and 0 would mean no motion.
+            # The attribute is required, and 0 is what people write who do not know it.
             self._notes.append(f'joint {self._joint}: {name} 0 of {source} is taken as not stated')
