@@ -18,3 +18,11 @@ def spin_until(
         if time.monotonic() > end:
             raise AssertionError(f'condition not met within {timeout_s:g} s')
         executor.spin_once(timeout_sec=0.05)
+
+
+def wait_for(condition: Callable[[], object]) -> None:
+    """Sleep until the condition holds; AssertionError when it does not within PATIENCE_S."""
+    end = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < end, 'condition not met in time'
+        time.sleep(0.005)

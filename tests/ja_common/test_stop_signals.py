@@ -10,14 +10,7 @@ import time
 import pytest
 
 from ja_common.stop_signals import STOP_SIGNALS, StopSignals
-from ros_testing import PATIENCE_S
-
-
-def wait_for(condition, timeout_s=PATIENCE_S):
-    end = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)
+from ros_testing import PATIENCE_S, wait_for
 
 
 @pytest.mark.parametrize('number', STOP_SIGNALS)

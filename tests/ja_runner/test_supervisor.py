@@ -20,7 +20,7 @@ from ja_common.executor import CachedWaitSetExecutor
 from ja_runner import node_process
 from ja_runner.node_spec import NodeSpec
 from ja_runner.supervisor import Supervision, Supervisor
-from ros_testing import PATIENCE_S
+from ros_testing import PATIENCE_S, wait_for
 
 pytestmark = pytest.mark.usefixtures('domain')
 
@@ -28,13 +28,6 @@ TALKER = NodeSpec('dummy_nodes', 'talker')
 CRASHER = NodeSpec('dummy_nodes', 'talker', {'text': 'crash'})
 HANGING = NodeSpec('dummy_nodes', 'talker', {'text': 'hang'})
 STUBBORN = NodeSpec('dummy_nodes', 'stubborn')
-
-
-def wait_for(condition: Callable[[], object], timeout_s: float = PATIENCE_S) -> None:
-    end = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < end, 'condition not met in time'
-        time.sleep(0.02)
 
 
 def alive(pid: int) -> bool:

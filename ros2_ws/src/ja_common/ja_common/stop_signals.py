@@ -23,6 +23,16 @@ def end_process(number: int) -> None:
     os._exit(128 + number)
 
 
+def end_quietly_at_sigint() -> None:
+    """Let SIGINT end this process without a word, before there is anything to save.
+
+    Python's handler would end an import with a traceback. Python sets it before any line of ours,
+    so the program that starts this one blocks the signal until here.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
 class StopSignals:
     """A context manager of the main thread: within it, the first signal is a request to stop.
 

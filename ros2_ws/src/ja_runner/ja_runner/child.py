@@ -7,6 +7,8 @@ import os
 import signal
 import sys
 
+from ja_common.stop_signals import end_quietly_at_sigint
+
 _PR_SET_PDEATHSIG = 1
 PARENT = 'JA_PARENT_PID'
 
@@ -28,11 +30,7 @@ def end_with_parent(parent: int) -> None:
 
 def main() -> None:
     """Run the `main` of the node's module, which the command line names."""
-    # Until the node takes over, a signal ends this process without a word: nothing is to be saved
-    # yet, and Python's handler would end an import with a traceback. The supervisor has blocked
-    # SIGINT until here, because Python sets its handler before any line of ours.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    end_quietly_at_sigint()  # until the node takes over; the supervisor has blocked it
     faulthandler.enable()
     faulthandler.register(STACK_SIGNAL)
     module = sys.argv[1]

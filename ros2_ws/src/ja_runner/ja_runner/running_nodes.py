@@ -19,6 +19,7 @@ from rclpy.context import Context
 
 from ja_common.core.config import ConfigError
 from ja_common.private_context import private_context
+from ja_common.ros_arguments import domain_id
 from ja_common.ros_defaults import LEASE_S, reaches_network
 from ja_runner.node_spec import NodeSpec
 
@@ -39,16 +40,14 @@ def claim_names(graph: Sequence[NodeSpec]) -> Iterator[None]:
     Raises ConfigError if nodes of these names run in this ROS domain, with what to do. It takes
     some milliseconds if nothing runs in the domain, and up to `_DISCOVERY_S` otherwise.
     """
-    with private_context(discovery=False) as context:
-        domain_id = context.get_domain_id()
-    names = full_names(graph)
+    domain, names = domain_id(), full_names(graph)
     with ExitStack() as claims:
-        taken = [name for name in names if not _claim(name, domain_id, claims)]
-        if taken := taken or _running(names, domain_id):
+        taken = [name for name in names if not _claim(name, domain, claims)]
+        if taken := taken or _running(names, domain):
             more = len(taken) - _MOST_NAMED
             which = ', '.join(taken[:_MOST_NAMED]) + (f' and {more} more' if more > 0 else '')
             raise ConfigError(
-                f'in ROS_DOMAIN_ID {domain_id} there is already {which}: end that graph first, '
+                f'in ROS_DOMAIN_ID {domain} there is already {which}: end that graph first, '
                 'set another ROS_DOMAIN_ID, or add a namespace: --ros-args -r __ns:=/NAME'
             )
         yield
@@ -79,10 +78,10 @@ def _full_name(spec: NodeSpec, context: Context) -> str:
         node.destroy_node()
 
 
-def _claim(name: str, domain_id: int, claims: ExitStack) -> bool:
+def _claim(name: str, domain: int, claims: ExitStack) -> bool:
     """Bind a socket that stands for the node's name on this machine; False: another has it."""
     claim = claims.enter_context(socket.socket(socket.AF_UNIX))
-    digest = hashlib.sha256(f'{domain_id}{name}'.encode()).hexdigest()
+    digest = hashlib.sha256(f'{domain}{name}'.encode()).hexdigest()
     try:
         claim.bind(f'\0joint-attention-{digest}')  # no file: the name ends with the process
     except OSError as error:
@@ -92,9 +91,9 @@ def _claim(name: str, domain_id: int, claims: ExitStack) -> bool:
     return True
 
 
-def _running(names: Sequence[str], domain_id: int) -> list[str]:
+def _running(names: Sequence[str], domain: int) -> list[str]:
     """Return those of the names that nodes of the ROS graph have, and keep."""
-    if not (reaches_network() or _has_participants(domain_id)):
+    if not (reaches_network() or _has_participants(domain)):
         return []
     with private_context(discovery=True) as context:
         probe = rclpy.create_node(
@@ -117,9 +116,9 @@ def _running(names: Sequence[str], domain_id: int) -> list[str]:
             probe.destroy_node()
 
 
-def _has_participants(domain_id: int) -> bool:
+def _has_participants(domain: int) -> bool:
     """Return whether a process of this machine may take part in the domain."""
-    first = _FIRST_PORT + _PORTS_PER_DOMAIN * domain_id
+    first = _FIRST_PORT + _PORTS_PER_DOMAIN * domain
     for port in range(first, first + _PARTICIPANTS * _PORTS_PER_PARTICIPANT, 2):
         with socket.socket(type=socket.SOCK_DGRAM) as own:
             try:
