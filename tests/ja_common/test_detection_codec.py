@@ -8,7 +8,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import Header
 
 from ja_common.core.detection import Detection, Kind
-from ja_common.detection_codec import FIELDS, decode_detections, encode_detections
+from ja_common.detection_codec import FIELDS, SENSE_FIELDS, decode_detections, encode_detections
 from ja_common.point_cloud_codec import decode_columns, encode_columns
 from node_bench import header
 
@@ -26,7 +26,7 @@ def test_there_and_back_with_the_header_unchanged():
 
 def test_any_tool_reads_the_points():
     message = encode_detections(Header(), [FACE, BALL])
-    assert [field.name for field in message.fields] == list(FIELDS)
+    assert [field.name for field in message.fields] == [*FIELDS, *SENSE_FIELDS]
     assert {field.datatype for field in message.fields} == {PointField.FLOAT32}
     assert (message.height, message.width, message.row_step) == (1, 2, 2 * message.point_step)
     x, y, z = np.frombuffer(message.data, '<f4').reshape(2, -1)[1, :3]
@@ -36,7 +36,7 @@ def test_any_tool_reads_the_points():
 def test_nothing_seen_is_a_message_too():
     message = encode_detections(Header(), [])
     assert message.width == 0
-    assert [field.name for field in message.fields] == list(FIELDS)
+    assert [field.name for field in message.fields] == [*FIELDS, *SENSE_FIELDS]
     assert decode_detections(message) == []
 
 

@@ -57,6 +57,21 @@ WIDE_IMAGE = Topic(
     'wide/image_raw', Image, 'wide picture in which the digital head moves its window', **_PICTURE
 )
 CAMERA_INFO = Topic('camera_info', CameraInfo, 'intrinsics of the head camera', **_PICTURE)
+DEPTH = Topic(
+    'depth/image_raw',
+    Image,
+    'distances along the optical axis, registered to image_raw (REP-118: 16UC1 [mm], 32FC1 [m])',
+    **_PICTURE,
+)
+RIGHT_IMAGE = Topic(
+    'right/image_raw', Image, 'picture of a second camera to the right of the first', **_PICTURE
+)
+RIGHT_CAMERA_INFO = Topic(
+    'right/camera_info',
+    CameraInfo,
+    'intrinsics of the second camera; its P has the baseline',
+    **_PICTURE,
+)
 JOINT_STATES = Topic('joint_states', JointState, 'measured posture of the head', **_SENSOR)
 DETECTIONS = Topic(
     'detections', PointCloud2, 'objects and faces of one image, empty ones too', **_LINK
@@ -65,6 +80,18 @@ TARGET = Topic('target', PointStamped, 'ray to the most salient object (Eq. 1)',
 FACE = Topic('face', PointStamped, "ray to the caregiver's face", **_LINK)
 FACE_IMAGE = Topic(
     'face_image', Image, "the caregiver's face, 30 rows x 25 columns, while attended", **_LINK
+)
+FACE_GAZE = Topic(
+    'face_gaze',
+    PointCloud2,
+    'head pose and eye-in-head angles of the attended face, by landmarks; one point a look',
+    **_LINK,
+)
+FACE_LANDMARKS = Topic(
+    'face_landmarks',
+    PointCloud2,
+    'landmarks of the attended face in the image: u, v [px]; published while a subscriber exists',
+    **_LINK,
 )
 IMAGE_ANNOTATED = Topic(
     'image_annotated',

@@ -1,5 +1,6 @@
 """One object or face in one image, as the detector reports it."""
 
+import math
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -21,7 +22,9 @@ class Detection(NamedTuple):
     `height`: centre and size of its box in the image [px]. `score`: the weighted sum of Eq. 1 for
     an object, the detector's confidence for a face. `f_col`, `f_edg`, `f_mot`: the features of
     Eq. 1, each 0-1. `attended`: a face that stands in the centre while the head is still, of which
-    `face_image` of the same stamp shows the picture.
+    `face_image` of the same stamp shows the picture. `gaze_read`: an attended face of which
+    `face_gaze` of the same stamp holds the head pose and the eyes. `range_m`: the distance from
+    the camera [m] along the ray, and `range_deviation_m` its spread; NaN where it is not known.
     """
 
     kind: Kind
@@ -37,11 +40,19 @@ class Detection(NamedTuple):
     f_edg: float = 0.0
     f_mot: float = 0.0
     attended: bool = False
+    gaze_read: bool = False
+    range_m: float = math.nan
+    range_deviation_m: float = math.nan
 
     @property
     def ray(self) -> NDArray[np.float64]:
         """Return the ray (x, y) in the optical frame, shape (2,)."""
         return np.array([self.x, self.y])
+
+    @property
+    def range(self) -> NDArray[np.float64]:
+        """Return the distance from the camera and its deviation, (2,) [m]; NaN if unknown."""
+        return np.array([self.range_m, self.range_deviation_m])
 
 
 def objects(detections: list[Detection]) -> list[Detection]:
