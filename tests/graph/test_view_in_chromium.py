@@ -4,6 +4,7 @@ JA_SCREENSHOTS=FOLDER keeps screenshots.
 """
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -60,10 +61,12 @@ for (const [what, options] of [
 
 
 @pytest.fixture
-def demo(domain: int, tmp_path: Path) -> Iterator[tuple[str, int]]:
-    """Start a demo; return the address of its page and its process id."""
+def demo(request, domain: int, tmp_path: Path) -> Iterator[tuple[str, int]]:
+    """Start a demo, with further options; return the address of its page and its process id."""
+    options = getattr(request, 'param', [])
     process = subprocess.Popen(
-        [sys.executable, '-m', 'ja_bringup.cli', 'demo', '--exam', '0', '--on-death', 'restart'],
+        [sys.executable, '-m', 'ja_bringup.cli', 'demo', '--exam', '0', '--on-death', 'restart',
+         *options],
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )  # fmt: skip
     lines = []
@@ -207,6 +210,34 @@ def test_a_viewer_sees_and_controls_the_robot(screen, demo, browse):
     wait(lambda: 'the simulation is paused' not in text(browser))
     wait(lambda: source(browser) != paused)
     assert console_errors(browser) == [], "the page's own policy blocks nothing of it"
+
+
+@pytest.mark.parametrize('demo', [['--senses', 'eyes,depth']], indirect=True, ids=['senses'])
+@pytest.mark.parametrize('screen', SCREENS, ids=lambda screen: screen[0])
+def test_landmarks_gaze_ranges_and_the_track_are_shown(screen, demo, browse):
+    name, width, height, phone = screen
+    browser = browse(width, height, phone)
+    browser.get(demo[0])
+    wait(lambda: 'landmarks' in text(browser) and 'iris_landmark.onnx=' in text(browser))
+    # The demo ends in order only after a scored trial.
+    wait(lambda: 'success, last' in text(browser))
+    wait_for_picture(browser)
+    wait(lambda: browser.find_elements('css selector', 'line.gaze'))
+    wait(lambda: pink(picture(browser)) > 30)  # the arrow of her gaze
+    titles = browser.execute_script(
+        "return [...document.querySelectorAll('svg title')].map(title => title.textContent)"
+    )
+    assert any(re.fullmatch(r'(face|object \d+), \d\.\d\d m', title) for title in titles), titles
+    keep(browser, f'{name}_senses')
+    wide = browser.execute_script('return document.documentElement.scrollWidth')
+    assert wide <= width, 'no element is wider than the screen'
+    assert console_errors(browser) == []
+
+
+def pink(image: np.ndarray) -> int:
+    """Return how many pixels have about the colour of the arrow."""
+    blue, green, red = np.moveaxis(image.astype(int), -1, 0)
+    return int(((red > 210) & (green < 130) & (blue > 150)).sum())
 
 
 @pytest.mark.parametrize('page', ['127.0.0.1', '0.0.0.0'], indirect=True)

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from ja_bringup.success_curve import draw_png, write_csv
+from ja_bringup.success_curve import CurveOrigin, draw_png, write_csv
 from ja_common.core.learning_curve import LearningCurve
 
 
@@ -36,11 +36,14 @@ def test_rate_of_a_part_and_of_a_stage(curve):
 
 
 def test_csv_has_one_row_a_trial(curve, tmp_path):
-    rows = list(csv.DictReader(write_csv(curve, tmp_path).open()))
+    origin = CurveOrigin('strict with depth', {'face.onnx': 'a' * 64, 'b.onnx': 'b' * 64})
+    rows = list(csv.DictReader(write_csv(curve, tmp_path, origin).open()))
     assert [row['trial'] for row in rows] == ['1', '2', '3', '4', '5']
     assert [row['success'] for row in rows] == ['0', '1', '1', '0', '1']
     assert [row['stage'] for row in rows] == ['exam before', *['practice'] * 4]
     assert float(rows[2]['p_lm']) == pytest.approx(0.2)
+    assert {row['track'] for row in rows} == {'strict with depth'}
+    assert {row['weight_files'] for row in rows} == {f'b.onnx={"b" * 16} face.onnx={"a" * 16}'}
 
 
 def test_png_shows_what_was_learned(curve, tmp_path):

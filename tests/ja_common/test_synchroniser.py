@@ -34,7 +34,7 @@ class Recorder(GraphNode):
             {VF_DELTA: joints.decode, FACE_DELTA: joints.decode},
             lambda found: self._record('pair', found),
             also={LM_DELTA: joints.decode},
-            also_when=lambda delta: delta is not None,
+            also_which=lambda delta: [] if delta is None else [LM_DELTA],
         )
         self.synchroniser.call_with(
             {FIXATION: joints.decode}, lambda found: self._record('single', found)

@@ -88,7 +88,7 @@ def not_finite(message):
 @pytest.mark.parametrize(
     ('spoil', 'text'),
     [
-        (no_data, '/detections: a point cloud of 1 points of 56 bytes holds 0 bytes'),
+        (no_data, '/detections: a point cloud of 1 points of 68 bytes holds 0 bytes'),
         (lacks_a_field, "/detections: the point cloud lacks the fields ['score']"),
         (not_finite, '/detections: detections hold numbers that are not finite'),
     ],

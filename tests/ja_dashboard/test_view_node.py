@@ -19,13 +19,16 @@ from rcl_interfaces.srv import (
 )
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
+from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from ja_common.camera_info_codec import encode_camera_info
 from ja_common.core.config import Configuration, parameter
 from ja_common.core.detection import Detection, Kind
+from ja_common.core.face_gaze import FaceGaze
 from ja_common.core.health import Level
 from ja_common.detection_codec import encode_detections
+from ja_common.face_gaze_codec import encode_face_gaze
 from ja_common.graph_node import GraphNode
 from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
@@ -35,7 +38,9 @@ from ja_common.topics import (
     CAMERA_INFO,
     DETECTIONS,
     DIAGNOSTICS,
+    FACE_GAZE,
     FACE_IMAGE,
+    FACE_LANDMARKS,
     FIXATION,
     GATE_STATUS,
     IMAGE,
@@ -43,7 +48,10 @@ from ja_common.topics import (
     JOINT_STATES,
     SCORE,
     SIM_TRUTH,
+    TRACK,
+    WEIGHT_FILES,
 )
+from ja_common.weight_files_codec import encode_weight_files
 from ja_dashboard.core.view_model import RunState
 from ja_dashboard.view_node import ViewNode
 from node_bench import header, joint_state
@@ -130,6 +138,56 @@ def test_images_are_received_only_with_a_viewer(bench):
     bench.node._viewer_s = -math.inf
     bench.wait(lambda: not any(subscribers(bench, topic) for topic in WATCHED))
     assert set(bench.node.polled_subscriptions) == {FIXATION, GATE_STATUS}
+
+
+def test_senses_are_subscribed_once_they_exist_and_only_with_a_viewer(bench):
+    watch(bench)
+    senses = {FACE_GAZE, FACE_LANDMARKS}
+    show_images(bench, lambda scene: scene.command is not None)
+    assert not senses & set(bench.node.polled_subscriptions)
+    for topic in senses:
+        publisher = bench.peer.create_publisher(topic.type, topic.name, topic.publisher_qos)
+        bench._publishers[topic.name] = publisher
+
+    def subscribed():
+        bench.node.note_viewer()
+        return all(subscribers(bench, topic) for topic in senses)
+
+    bench.wait(subscribed)
+    head = header(0)
+    read = FaceGaze(np.array([0.3, 0.1, 0.0]), 0.03, np.full((2, 2), 0.1), 0.04)
+    messages = {
+        DETECTIONS: encode_detections(head, [FACE._replace(attended=True, gaze_read=True)]),
+        FACE_GAZE: encode_face_gaze(head, read),
+        FACE_LANDMARKS: encode_columns(head, {'u': [190.0, 195.0], 'v': [120.0, 121.0]}),
+    }
+    stamps = iter(range(9_000_000_000, 10**12, 10_000_000))
+
+    def shown():
+        bench.node.note_viewer()
+        publish_image(bench, next(stamps), messages)
+        picture = bench.node.frame.picture
+        return (
+            picture is not None and picture.gaze.gaze is not None and len(picture.gaze.landmarks)
+        )
+
+    bench.wait(shown)
+    assert bench.node.frame.picture.gaze.landmarks == pytest.approx(
+        np.array([[190, 120], [195, 121]])
+    )
+    assert bench.node.frame.scene.gaze == pytest.approx((0.4, 0.2))
+    bench.node._viewer_s = -math.inf
+    bench.wait(lambda: not any(subscribers(bench, topic) for topic in senses))
+
+
+def test_the_facts_name_the_track_and_the_weight_files(make_bench):
+    bench = make_bench(ViewNode, publishes=[TRACK, WEIGHT_FILES])
+    assert 'track' not in bench.node.frame.facts
+    bench.publish(TRACK, String(data='landmarks with depth'))
+    bench.publish(WEIGHT_FILES, encode_weight_files('/eyes', {'face.onnx': 'a' * 64}))
+    bench.wait(lambda: {'track', 'weight files'} <= bench.node.frame.facts.keys())
+    assert bench.node.frame.facts['track'] == 'landmarks with depth'
+    assert bench.node.frame.facts['weight files'] == f'face.onnx={"a" * 16}'
 
 
 def test_an_image_is_shown_with_its_detections(bench):

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ja_common.core.face_gaze import FaceGaze
 from ja_experiments.datasets.looks import Looks, load_looks
 
 
@@ -110,3 +111,85 @@ def test_rendered_looks_show_where_she_looks(tmp_path: Path) -> None:
     assert np.abs(found.postures).max() < np.radians(4)
     assert np.ptp(found.directions[:, 0]) > np.radians(30)
     assert all(face.std() > 10 for face in found.faces)
+
+
+def test_looks_without_senses_have_nothing_measured(looks: Looks) -> None:
+    assert looks.gazes.shape == (125, 9)
+    assert looks.face_ranges.shape == looks.object_ranges.shape == (125, 2)
+    assert looks.face_distances.shape == looks.object_distances.shape == (125,)
+    for name in ('gazes', 'face_ranges', 'object_ranges', 'face_distances', 'object_distances'):
+        assert np.isnan(getattr(looks, name)).all()
+        assert len(getattr(looks[:20], name)) == 20
+
+
+def test_senses_and_image_size_have_their_own_looks(tmp_path: Path, renderer: Renderer) -> None:
+    orders: list[dict] = [
+        {},
+        {'senses': True},
+        {'image_size': (640, 480)},
+        {'senses': True, 'image_size': (640, 480)},
+    ]
+    for _ in range(2):
+        for order in orders:
+            load_looks(
+                count=125, folder=tmp_path, report=lambda line: None, render=renderer, **order
+            )
+    assert renderer.times == len(orders), 'each is rendered once and then cached'
+    assert {path.name for path in tmp_path.iterdir()} == {
+        'looks-default-0-125',
+        'looks-default-0-125-senses',
+        'looks-default-0-125-640x480',
+        'looks-default-0-125-senses-640x480',
+    }
+    manifest = json.loads(
+        (tmp_path / 'looks-default-0-125-senses-640x480' / 'manifest.json').read_text()
+    )
+    assert manifest['made_by']['senses'] is True
+    assert manifest['made_by']['image_size'] == [640, 480]
+
+
+def test_looks_with_senses_that_are_copied_to_the_others_name_are_not_used(
+    tmp_path: Path, renderer: Renderer
+) -> None:
+    load_looks(count=125, folder=tmp_path, report=lambda line: None, render=renderer, senses=True)
+    (kept,) = tmp_path.iterdir()
+    kept.rename(tmp_path / 'looks-default-0-125')
+    lines: list[str] = []
+    load(tmp_path, renderer, lines)
+    assert renderer.times == 2
+    assert 'made with other senses' in lines[0]
+
+
+def test_what_was_measured_survives_the_cache(tmp_path: Path, looks: Looks) -> None:
+    rng = np.random.default_rng(0)
+    measured = Looks(
+        looks.faces, looks.faces_at, looks.postures, looks.directions,
+        rng.random((125, 9)), rng.random((125, 2)), rng.random((125, 2)),
+        rng.random(125), rng.random(125),
+    )  # fmt: skip
+    renderer = Renderer(measured)
+    load(tmp_path, renderer, [])
+    found = load(tmp_path, renderer, [])
+    assert renderer.times == 1
+    for name, values in vars(measured).items():
+        np.testing.assert_array_equal(getattr(found, name), values)
+
+
+def test_looks_with_senses_hold_what_was_measured_and_what_is_true(tmp_path: Path) -> None:
+    """Ranges are of the surfaces; her head's yaw follows the attended object."""
+    count = 16
+    found = load_looks(count=count, folder=tmp_path, report=lambda line: None, senses=True)
+    assert len(found) == count
+    assert np.isfinite(found.face_ranges).all()
+    assert np.isfinite(found.object_ranges).mean() > 0.8
+    # The surface of her face is near its centre; that of an object is nearer by its radius.
+    np.testing.assert_allclose(found.face_ranges[:, 0], found.face_distances, atol=0.06)
+    nearer = found.object_distances - found.object_ranges[:, 0]
+    assert 0.0 < np.nanmedian(nearer) < 0.06
+    assert np.nanmax(np.abs(nearer)) < 0.1
+    assert np.corrcoef(found.object_distances, np.nan_to_num(found.object_ranges[:, 0]))[0, 1] > 0
+    read = [FaceGaze.from_row(row) for row in found.gazes]
+    yaw = np.array([np.nan if gaze is None else gaze.head[0] for gaze in read])
+    known = np.isfinite(yaw)
+    assert known.mean() > 0.5
+    assert np.corrcoef(yaw[known], found.directions[known, 0])[0, 1] > 0.8

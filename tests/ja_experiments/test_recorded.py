@@ -77,6 +77,7 @@ def test_the_experiment_learns_from_recorded_looks(
     assert f'15 recorded looks of {len(seen)} (`data`)' in text
     assert f'{len(seen) - 15} other looks' in text
     assert 'Figure 7' not in text
+    assert 'made the pictures: not known' in text
     assert (path.parent / 'figure-6b.png').exists()
     numbers = json.loads((path.parent / 'results.json').read_text(), parse_constant=pytest.fail)
     alone = numbers['figure 6']['pairs all, 3 objects']['alone']

@@ -1,7 +1,9 @@
 """A short study, from configuration to report."""
 
+import hashlib
 import json
 import math
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -90,5 +92,12 @@ def test_a_study_becomes_a_report(tmp_path: Path, materials: Materials) -> None:
     assert np.array(curve).shape == (2, BLOCKS)
     kept = yaml.safe_load((path.parent / 'config.yaml').read_text())
     assert kept['study']['plan']['seeds'] == [0, 1]
+    shipped = (files('ja_perception.models') / 'blazeface_short_range.onnx').read_bytes()
+    digest = hashlib.sha256(shipped).hexdigest()
+    for named in (kept, numbers):
+        assert named['track'] == 'strict'
+        assert named['weight_files'] == {'blazeface_short_range.onnx': digest}
+    assert 'Track: *strict*' in text
+    assert digest[:16] in text
     # The gate keeps its place: at 12 of 30 blocks.
     assert kept['readings']['all']['sigmoid_centre_trials'] == pytest.approx(1200)

@@ -149,7 +149,7 @@ def test_it_learns_what_it_would_have_learned_in_one_thread(make):
         alone.update(trial(number))
         background.update(trial(number))
         # A question meanwhile must change nothing.
-        background.predictor.propose(trial(number).face, (0, 0), (0, 0), [(0.1, 0.2)])
+        background.predictor.propose(trial(number).look, (0, 0), [(0.1, 0.2)])
     state = background.call_with_learner(GazeLineLearner.state)
     for name, array in alone.state().items():
         np.testing.assert_array_equal(state[name], array, err_msg=name)

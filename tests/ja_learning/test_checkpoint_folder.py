@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -293,3 +294,12 @@ def test_a_resumed_learner_is_saved_when_so_many_more_were_learned(tmp_path):
         folder.save_when_due(learner)
     assert len(names(folder)[1:]) == 2
     folder.close()
+
+
+def test_a_file_from_before_a_setting_existed_was_made_with_its_default(folder):
+    path = folder.save(trained(3))
+    older = {name: value for name, value in CONFIGURATION.items() if name != 'momentum'}
+    spoil_description(path, configuration=older)
+    assert folder.resume_into(untrained()) == Resumed(path, [])
+    with pytest.raises(ConfigError, match=re.escape('made with momentum = 0.5, here it is 0.1')):
+        folder.resume_into(untrained(momentum=0.1))

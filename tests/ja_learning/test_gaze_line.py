@@ -10,14 +10,14 @@ from ja_learning.core.gaze_line import GazeLineLearner
 from ja_learning.core.gaze_line_belief import GazeLineBelief
 from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_learning.core.gaze_line_network import (
-    ANGLE_SCALE_RAD,
     GazeLineNetwork,
     give_member,
     standardised,
 )
 from ja_learning.core.gaze_line_pass import GazeLinePass
+from ja_learning.core.gaze_line_places import ANGLE_SCALE_RAD
 from ja_learning.core.learner_registry import make_learner
-from ja_learning.core.trial import Trial
+from ja_learning.core.trial import Look, Trial
 
 LOOK = np.array([0.1, -0.05])
 
@@ -51,7 +51,7 @@ def share_right(learner: GazeLineLearner, rng: np.random.Generator, trials: int 
     right = 0
     for _ in range(trials):
         trial, attended = made_trial(rng)
-        delta = learner.propose(trial.face, LOOK, LOOK, trial.candidates)
+        delta = learner.propose(trial.look, LOOK, trial.candidates)
         nearest = np.argmin(np.linalg.norm(trial.candidates - LOOK - delta, axis=1))
         right += nearest == attended
     return right / trials
@@ -128,7 +128,7 @@ def test_members_do_not_depend_on_each_other():
 
 def test_samples_of_the_belief_are_as_its_density_says(learner):
     face = drawn_face(np.array([0.4, 0.1]))
-    samples = learner.belief(face, LOOK, np.random.default_rng(0), 4000)
+    samples = learner.belief(Look(face, LOOK), np.random.default_rng(0), 4000)
     assert samples.shape == (4000, 2)
     # E[-log p] of a density's own samples is its entropy: the same from two independent halves,
     # and lower than that of the samples moved aside.
@@ -178,7 +178,15 @@ def test_the_belief_in_numpy_equals_the_network_in_torch():
         learned = network.log_density(gaze, scaled).numpy() - 2 * np.log(ANGLE_SCALE_RAD)
     for member in range(2):
         weights = np.where(np.arange(2) == member, 0.0, -np.inf)
-        belief = GazeLineBelief(network, weights, 0.0, True, 4.5)
+        belief = GazeLineBelief(
+            lambda look: look.face,
+            GazeLinePass(network),
+            network.mixture().as_numpy(),
+            weights,
+            0.0,
+            True,
+            4.5,
+        )
         asked = belief.log_density(faces, LOOK, LOOK + places)
         assert asked == pytest.approx(learned[member], abs=1e-3)
 
@@ -205,13 +213,14 @@ def test_ratios_are_to_the_mean_of_all_places_that_were_seen():
     network = GazeLineNetwork(members=2, channels=4)
     gaze = torch.tensor([[[0.6, -0.3]], [[0.1, 0.5]]])
     random = torch.Generator().manual_seed(0)
-    places = torch.randn(1, 1, 3, 2, generator=random) / 2
-    negatives = torch.randn(2, 7, 2, generator=random) / 2
+    places, negatives = torch.full((1, 1, 3, 8), torch.nan), torch.full((2, 7, 8), torch.nan)
+    places[..., :2] = torch.randn(1, 1, 3, 2, generator=random) / 2
+    negatives[..., :2] = torch.randn(2, 7, 2, generator=random) / 2
     places[0, 0, 2] = torch.nan
     with torch.no_grad():
         ratio = network.log_ratio(gaze, places, negatives).exp()
         of_others = network.log_ratio(gaze, negatives[:, None], places[:, 0, :2].expand(2, -1, -1))
-        same = network.log_ratio(gaze, negatives[:, None, :1], negatives[:, :1].expand(2, 5, 2))
+        same = network.log_ratio(gaze, negatives[:, None, :1], negatives[:, :1].expand(2, 5, 8))
     assert ratio.shape == (2, 1, 3)
     assert ratio[..., 2].tolist() == [[0.0], [0.0]], 'what is not there'
     mean = (ratio.sum(-1) + of_others.exp().sum(-1)) / 9
@@ -234,7 +243,7 @@ def test_what_is_seen_in_every_trial_is_not_taken_for_the_gaze_target(learner):
     mistaken = 0
     for _ in range(100):
         trial = beside_a_lamp()
-        aim = LOOK + learner.propose(trial.face, LOOK, LOOK, trial.candidates)
+        aim = LOOK + learner.propose(trial.look, LOOK, trial.candidates)
         mistaken += np.allclose(aim, lamp)
     assert mistaken < 5
     assert learner.log_evidence > 20
@@ -295,10 +304,10 @@ def test_a_snapshot_stays_as_it_was_while_the_learner_goes_on(learner):
 def test_without_top_down_attention_the_best_guess_is_proposed_whatever_stands_there():
     both = [GazeLineLearner(GazeLineConfig(members=2, top_down=on), 5) for on in (False, True)]
     face = drawn_face(np.array([0.3, 0.1]))
-    guess = both[0].propose(face, LOOK, LOOK, np.empty((0, 2)))
+    guess = both[0].propose(Look(face, LOOK), LOOK, np.empty((0, 2)))
     near = [LOOK + guess + 0.01]
-    assert both[0].propose(face, LOOK, LOOK, near) == pytest.approx(guess)
-    assert both[1].propose(face, LOOK, LOOK, near) == pytest.approx(guess + 0.01)
+    assert both[0].propose(Look(face, LOOK), LOOK, near) == pytest.approx(guess)
+    assert both[1].propose(Look(face, LOOK), LOOK, near) == pytest.approx(guess + 0.01)
 
 
 def test_what_was_fixated_changes_nothing():
@@ -316,11 +325,11 @@ def test_what_was_fixated_changes_nothing():
 
 def test_a_plausible_object_is_proposed_exactly_else_the_best_guess(learner):
     face = drawn_face(np.zeros(2))
-    guess = learner.propose(face, LOOK, LOOK, np.empty((0, 2)))
+    guess = learner.propose(Look(face, LOOK), LOOK, np.empty((0, 2)))
     near, far = LOOK + guess + 0.01, LOOK + guess + 2.0
     here = LOOK + 0.2
-    assert learner.propose(face, LOOK, here, [near, far]) == pytest.approx(near - here)
-    assert learner.propose(face, LOOK, here, [far]) == pytest.approx(LOOK + guess - here)
+    assert learner.propose(Look(face, LOOK), here, [near, far]) == pytest.approx(near - here)
+    assert learner.propose(Look(face, LOOK), here, [far]) == pytest.approx(LOOK + guess - here)
 
 
 def test_a_trial_in_which_nothing_was_seen_changes_nothing(learner):
@@ -379,4 +388,4 @@ def test_learners_are_chosen_by_name(kind):
     made = make_learner(kind, seed=0)
     assert made.kind == kind
     face = drawn_face(np.zeros(2))
-    assert made.propose(face, LOOK, LOOK, np.empty((0, 2))).shape == (2,)
+    assert made.propose(Look(face, LOOK), LOOK, np.empty((0, 2))).shape == (2,)

@@ -11,7 +11,7 @@ from ja_common.core.config import ConfigError
 from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_learning.core.learner_registry import LEARNERS, LearnerChoice, make_learner
 from ja_learning.core.network_config import NetworkConfig
-from ja_learning.core.trial import FACE_SHAPE
+from ja_learning.core.trial import FACE_SHAPE, Look
 
 HEAVY = ('torch', 'numba')
 
@@ -50,7 +50,7 @@ def test_a_learner_of_every_kind_is_made_with_its_defaults(kind):
     assert learner.kind == kind
     assert learner.config == LEARNERS[kind].config()
     face = np.zeros(FACE_SHAPE, np.uint8)
-    assert learner.propose(face, np.zeros(2), np.zeros(2), np.empty((0, 2))).shape == (2,)
+    assert learner.propose(Look(face, np.zeros(2)), np.zeros(2), np.empty((0, 2))).shape == (2,)
 
 
 def test_the_default_is_the_learner_of_the_paper():

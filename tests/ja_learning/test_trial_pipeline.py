@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
+from ja_common.core.detection import Detection, Kind
 from ja_common.core.posture import Posture
 from ja_learning.core.look_around import LookAroundConfig
 from ja_learning.core.trial import FACE_SHAPE
 from ja_learning.core.trial_pipeline import BELIEF_SAMPLES, TrialPipeline
 
 FACE = np.full(FACE_SHAPE, 100, np.uint8)
-CENTRE = np.zeros(2)
+FACE_SEEN = Detection(Kind.FACE, 0.0, 0.0, 0, 0, 1, 1, 1.0, attended=True)
 TURN = np.array([0.3, 0.1])
 
 
@@ -21,11 +22,11 @@ class Log:
     def __init__(self):
         self.events = []
 
-    def propose(self, face, face_at, posture, candidates):
+    def propose(self, look, posture, candidates, ranges=None):
         self.events.append('propose')
         return TURN
 
-    def belief(self, face, face_at, rng, count):
+    def belief(self, look, rng, count):
         return np.tile(TURN, (count, 1))
 
     def on_trial(self, trial, posture):
@@ -45,11 +46,11 @@ class Head:
         return Posture(self.stamp_ns, np.array([pan, 0.0]), np.zeros(2))
 
     def look(self):
-        return self.pipeline.process_image(self.at(0.0), np.empty((0, 2)), (FACE, CENTRE))
+        return self.pipeline.process_image(self.at(0.0), [FACE_SEEN], FACE)
 
     def rest(self, pan, rays=()):
-        rays = np.reshape(np.array(rays), (-1, 2))
-        return self.pipeline.process_image(self.at(pan), rays, None)
+        seen = [Detection(Kind.OBJECT, x, y, 0, 0, 1, 1, 1.0) for x, y in rays]
+        return self.pipeline.process_image(self.at(pan), seen, None)
 
 
 @pytest.fixture

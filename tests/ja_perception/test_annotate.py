@@ -55,3 +55,20 @@ def test_draws_what_another_node_claims_to_have_found(size, place):
     face = np.zeros((400, 300), np.uint8)
     drawn = annotate_image(picture, found, face, camera, d_th_rad=0.1, latency_s=0.0)
     assert max(drawn.shape) < 480 + max(size)
+
+
+def test_draws_the_range_beside_the_box_where_it_is_known():
+    camera = CameraModel.from_field_of_view(320, 240, np.radians(36))
+    ball = Detection(Kind.OBJECT, 0.0, 0.0, 160.0, 120.0, 30.0, 30.0, score=0.5, track_id=1)
+
+    def draw(detection: Detection) -> np.ndarray:
+        return annotate_image(room(), [detection], None, camera, d_th_rad=0.1, latency_s=0.0)
+
+    without = draw(ball)
+    changed = draw(ball._replace(range_m=0.83, range_deviation_m=0.01)) != without
+    rows, columns, _ = np.nonzero(changed)
+    enlarge = without.shape[1] / 320
+    assert rows.size
+    # In the line above the box, to the right of the score.
+    assert rows.max() <= (120 - 15) * enlarge
+    assert columns.min() >= 160 * enlarge

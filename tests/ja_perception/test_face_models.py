@@ -15,9 +15,19 @@ from ja_perception.core import haar
 from ja_perception.core.blazeface import BlazeFace
 from ja_perception.core.box import Box
 from ja_perception.core.haar import HaarFaces
+from ja_perception.core.landmark_networks import FaceMesh, IrisFinder, TurnedSquare
 from synthetic_pictures import draw_face, room
 
 WHOLE = Box(159.5, 119.5, 320, 320)
+# Of noise, as LiteRT computes it from the original files.
+MESH_OF_NOISE = [
+    (108.0832, 110.8424, -8.588),
+    (108.8926, 133.7224, 0.0056),
+    (145.6073, 58.4429, 4.1414),
+]
+CONFIDENCE_OF_NOISE = 1.5146992048043404e-05
+LIDS_OF_NOISE = [(21.2119, 31.621), (29.8265, 27.4123)]
+IRIS_OF_NOISE = [(37.8521, 33.5821), (38.2015, 36.2566)]
 
 
 def two_faces() -> np.ndarray:
@@ -40,6 +50,17 @@ def test_blazeface_computes_what_the_original_tflite_file_does():
         assert found == pytest.approx(box, abs=1e-4)
         assert face.score == pytest.approx(score, abs=1e-6)
         assert face.keypoints[[0, 5]] == pytest.approx(np.array([right_eye, left_ear]), abs=1e-4)
+
+
+def test_landmark_networks_compute_what_the_original_tflite_files_do():
+    """The expected numbers are of `face_landmark.tflite`, `iris_landmark.tflite`, with LiteRT."""
+    picture = np.random.default_rng(0).integers(0, 256, (192, 192, 3), np.uint8)
+    landmarks, confidence = FaceMesh().find_landmarks(picture, TurnedSquare(95.5, 95.5, 192, 0.0))
+    assert landmarks[[0, 200, 467]] == pytest.approx(np.array(MESH_OF_NOISE), abs=1e-3)
+    assert confidence == pytest.approx(CONFIDENCE_OF_NOISE, rel=1e-3)
+    eye = IrisFinder().find_iris(picture[:64, :64], TurnedSquare(31.5, 31.5, 64, 0.0))
+    assert eye.lids[[0, 12]] == pytest.approx(np.array(LIDS_OF_NOISE), abs=1e-3)
+    assert eye.iris[[0, 4]] == pytest.approx(np.array(IRIS_OF_NOISE), abs=1e-3)
 
 
 def test_each_model_stands_in_the_notice_with_its_licence():

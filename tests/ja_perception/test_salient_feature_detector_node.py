@@ -13,14 +13,18 @@ from ja_common.camera_info_codec import encode_camera_info
 from ja_common.core.detection import Kind, caregiver_face
 from ja_common.detection_codec import decode_detections
 from ja_common.executor import CachedWaitSetExecutor
+from ja_common.face_gaze_codec import decode_face_gaze
 from ja_common.image_codec import decode_image, encode_image
+from ja_common.point_cloud_codec import decode_columns
 from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import (
     CAMERA_INFO,
     DETECTIONS,
     DIAGNOSTICS,
     FACE,
+    FACE_GAZE,
     FACE_IMAGE,
+    FACE_LANDMARKS,
     IMAGE,
     IMAGE_ANNOTATED,
     IMAGE_COMPRESSED,
@@ -331,3 +335,94 @@ def test_dark_samples_of_12_bits_are_seen(rig):
     message.header.stamp = to_time(PERIOD_NS)
     rig.publishers[IMAGE.name].publish(message)
     assert [d.kind for d in decode_detections(rig.answer())] == [Kind.FACE, Kind.OBJECT]
+
+
+@pytest.fixture
+def gaze_rig(ros_context):
+    rig = Rig(ros_context, read_gaze=True)
+    rig.listen(FACE_GAZE)
+    rig.wait(lambda: rig.publishers[IMAGE.name].get_subscription_count())
+    yield rig
+    rig.close()
+
+
+def test_gaze_of_an_attended_face_comes_before_the_detections(gaze_rig, monkeypatch):
+    rig, order = gaze_rig, []
+    for name in ('_face_gaze_publisher', '_detections_publisher'):
+        publisher = getattr(rig.detector, name)
+
+        def publish(message, name=name, publish=publisher.publish):
+            order.append((name, to_ns(message.header.stamp)))
+            publish(message)
+
+        monkeypatch.setattr(publisher, 'publish', publish)
+    rig.joints(PERIOD_NS, speed=0.5)
+    rig.image(PERIOD_NS, caregiver_and_ball())
+    assert not caregiver_face(decode_detections(rig.answer())).gaze_read
+    assert order == [('_detections_publisher', PERIOD_NS)]
+    rig.joints(2 * PERIOD_NS)
+    rig.image(2 * PERIOD_NS, caregiver_and_ball())
+    face = caregiver_face(decode_detections(rig.answer(2)))
+    assert face.attended
+    assert face.gaze_read
+    assert [name for name, stamp_ns in order if stamp_ns == 2 * PERIOD_NS] == [
+        '_face_gaze_publisher',
+        '_detections_publisher',
+    ]
+    rig.wait(lambda: rig.all_of(FACE_GAZE))
+    (message,) = rig.all_of(FACE_GAZE)
+    assert to_ns(message.header.stamp) == 2 * PERIOD_NS
+    gaze = decode_face_gaze(message)
+    assert np.abs(gaze.head).max() < np.radians(30)
+    assert gaze.visible.any()
+
+
+def test_landmarks_are_published_while_a_subscriber_exists(gaze_rig):
+    rig = gaze_rig
+    rig.listen(FACE_LANDMARKS)
+    rig.wait(lambda: rig.detector.count_subscribers(FACE_LANDMARKS.name))
+    rig.joints(PERIOD_NS)
+    rig.image(PERIOD_NS, caregiver_and_ball())
+    rig.wait(lambda: rig.all_of(FACE_LANDMARKS))
+    (message,) = rig.all_of(FACE_LANDMARKS)
+    assert to_ns(message.header.stamp) == PERIOD_NS
+    columns = decode_columns(message, ('u', 'v'))
+    assert len(columns['u']) >= 468 + 5
+    assert columns['u'].mean() == pytest.approx(160, abs=15)
+    assert columns['v'].mean() == pytest.approx(130, abs=15)
+
+
+def test_a_face_whose_gaze_is_not_asked_for_is_not_read(rig):
+    rig.listen(FACE_GAZE)
+    rig.joints(PERIOD_NS)
+    rig.image(PERIOD_NS, caregiver_and_ball())
+    face = caregiver_face(decode_detections(rig.answer()))
+    assert face.attended
+    assert not face.gaze_read
+    assert not rig.all_of(FACE_GAZE)
+
+
+def test_an_opencv_that_cannot_read_the_landmarks_is_named_and_detections_go_on(
+    ros_context, monkeypatch
+):
+    read = cv2.dnn.readNetFromONNX
+
+    def refuse(content):
+        if content.size > 1_000_000:
+            raise cv2.error('Unsupported operation')
+        return read(content)
+
+    monkeypatch.setattr(cv2.dnn, 'readNetFromONNX', refuse)
+    rig = Rig(ros_context, read_gaze=True)
+    try:
+        rig.wait(lambda: rig.publishers[IMAGE.name].get_subscription_count())
+        rig.joints(PERIOD_NS)
+        rig.image(PERIOD_NS, caregiver_and_ball())
+        face = caregiver_face(decode_detections(rig.answer()))
+        assert face.attended
+        assert not face.gaze_read
+        status = rig.diagnosis('cannot read face_landmark.onnx')
+        assert status.level == b'\x01'
+        assert 'install OpenCV 4.6 or newer' in status.message
+    finally:
+        rig.close()

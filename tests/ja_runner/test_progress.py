@@ -6,8 +6,10 @@ import math
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rich.console import Console
+from std_msgs.msg import String
 
-from ja_common.topics import DIAGNOSTICS, FIXATION, GATE_STATUS, SCORE
+from ja_common.topics import DIAGNOSTICS, FIXATION, GATE_STATUS, SCORE, TRACK, WEIGHT_FILES
+from ja_common.weight_files_codec import encode_weight_files
 from ja_runner.progress import Display, ProgressNode
 from node_bench import joint_state
 
@@ -53,6 +55,16 @@ def test_a_warning_is_shown_until_it_is_over(make_bench):
     bench.wait(lambda: bench.node.facts().get('/gate') == 'no')
     bench.publish(DIAGNOSTICS, DiagnosticArray(status=[status(DiagnosticStatus.OK, '/gate')]))
     bench.wait(lambda: '/gate' not in bench.node.facts())
+
+
+def test_it_keeps_what_the_learner_starts_from(make_bench):
+    bench = make_bench(ProgressNode, publishes=[TRACK, WEIGHT_FILES])
+    assert bench.node.facts()['track'] == '-'
+    bench.publish(TRACK, String(data='landmarks'))
+    bench.publish(WEIGHT_FILES, encode_weight_files('/eyes', {'face.onnx': 'a' * 64}))
+    bench.wait(lambda: bench.node.weight_files and bench.node.track)
+    assert bench.node.facts()['track'] == 'landmarks'
+    assert bench.node.weight_files == {'face.onnx': 'a' * 64}
 
 
 def test_without_a_terminal_a_plain_line_is_printed(make_bench):

@@ -24,6 +24,7 @@ def test_default_is_the_geometry_of_the_figures():
     assert scene.objects.distance_m == (0.6, 1.0)
     assert (scene.objects.gap_to_face_deg, scene.objects.gap_deg) == (8.0, 5.0)
     assert scene.head == HEAD_PRESETS['ideal']
+    assert (scene.senses.depth, scene.senses.second_camera) == ('none', False)
 
 
 def test_easy_keeps_all_objects_in_the_first_view():
@@ -54,6 +55,13 @@ def test_a_file_names_only_what_differs(tmp_path):
         ('head: servo', 1, 'choose ideal, hobby_servo'),
         ('head: ideal\ncaregiver: anna', 2, 'expected a table'),
         ('room:\n  furnished: 3', 2, 'bool'),
+        ('senses:\n  depth: yes', 2, 'str is needed'),
+        ('senses:\n  depth: lidar', 2, 'none, sensor, exact'),
+        ('senses:\n  baseline_m: 0', 2, 'outside the range'),
+        ('senses:\n  disparity_noise_px: -1', 2, 'outside the range'),
+        ('senses:\n  depth_range_m: [4, 0.3]', 2, 'rising pair'),
+        ('senses:\n  second_kamera: true', 2, "did you mean 'second_camera'"),
+        ('senses: depth', 1, 'expected a table'),
         ('head:\n  camera_latency_s: 0.1', 2, 'camera_rate_hz'),
         ('head: ideal\nobjects: [', 2, 'not YAML'),
     ],

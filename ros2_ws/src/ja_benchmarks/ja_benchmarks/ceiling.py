@@ -19,6 +19,9 @@ from ja_sim.core.scene import Scene, load_scene
 # From the base frame to her rest frame, in which x points towards the robot.
 _TO_HER_FRAME = np.array([-1.0, -1.0, 1.0])
 
+READER_ERRORS_DEG = {'gaze read at 640x480': (1.68, 1.25), 'gaze read at 320x240': (1.89, 1.38)}
+"""Errors in pan and tilt."""
+
 
 def ceiling(trials: int = 8000) -> dict[str, Row]:
     """Return the success of observers that know the direction of her eyes, or of her head.
@@ -51,6 +54,63 @@ def ceiling(trials: int = 8000) -> dict[str, Row]:
             off_guess.argmin(axis=1) == 0
         )
     return rows
+
+
+def ceiling_of_senses(trials: int = 4000) -> dict[str, Row]:
+    """Return the success of observers that read her gaze with an error, with and without ranges.
+
+    They know the geometry of the scene, the size of the error, and her distance; not how far the
+    objects are, or that with the error of a sensor. `READER_ERRORS_DEG`: of the reader of
+    landmarks (`./ja bench gaze_reading`).
+    """
+    rows: dict[str, Row] = {}
+    for count in (5, 10):
+        scene = load_scene('default')
+        scene = dataclasses.replace(scene, objects=dataclasses.replace(scene.objects, count=count))
+        positions = _arrangements(scene, trials)
+        directions, distances = directions_of_vectors(positions), np.linalg.norm(positions, axis=2)
+        looked_at = _looked_at(scene, positions[:, 0])
+        gaze = directions_of_vectors((looked_at - _face(scene)) * _TO_HER_FRAME)
+        rng = np.random.default_rng(3)
+        for reader, error_deg in {'exact gaze': (0.0, 0.0), **READER_ERRORS_DEG}.items():
+            read = gaze + np.radians(error_deg) * rng.normal(size=gaze.shape)
+            for share in (None, 0.1, 0.03):
+                measured = distances * (1 + (share or 0.0) * rng.normal(size=distances.shape))
+                likelihood = _likelihood_of_gaze(
+                    scene, read, np.radians(error_deg), directions, measured, share
+                )
+                depth = 'depth unknown' if share is None else f'depth to {100 * share:.0f} %'
+                rows[f'ceiling, {count} objects, {reader}, {depth}'] = share_row(
+                    likelihood.argmax(axis=1) == 0
+                )
+    return rows
+
+
+def _likelihood_of_gaze(
+    scene: Scene,
+    read: np.ndarray,
+    error_rad: np.ndarray,
+    directions: np.ndarray,
+    measured: np.ndarray,
+    share: float | None,
+    steps: int = 41,
+) -> np.ndarray:
+    """Return the likelihood (T, N) of read gazes (T, 2) for objects at directions (T, N, 2).
+
+    `measured` (T, N) [m]: their ranges, with this `share` as error; None: ranges are not known.
+    """
+    face, likelihood, total = _face(scene), np.zeros(measured.shape), np.zeros(measured.shape)
+    deviation = np.hypot(error_rad, np.radians(scene.caregiver.gaze_noise_deg))
+    for distance in np.linspace(*scene.objects.distance_m, steps):
+        weight = np.ones(measured.shape)
+        if share is not None:
+            weight = np.exp(-0.5 * ((measured - distance) / (share * distance)) ** 2) / distance
+        places = distance * vectors_of_directions(directions)
+        off = (read[:, None] - directions_of_vectors((places - face) * _TO_HER_FRAME)) / deviation
+        likelihood += weight * np.exp(-0.5 * (off**2).sum(axis=-1))
+        total += weight
+    # Beyond the limits of the scene a noisy range may leave no weight at all.
+    return likelihood / np.maximum(total, 1e-300)
 
 
 def _face(scene: Scene) -> np.ndarray:

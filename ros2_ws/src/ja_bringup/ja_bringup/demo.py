@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ja_bringup.course import Course, Stage
-from ja_common.core.learning_curve import LearningCurve
 from ja_common.core.run_folder import new_run_folder
 from ja_runner.node_spec import NodeSpec
 from ja_runner.progress import WINDOW_TRIALS, ProgressNode
@@ -50,7 +49,8 @@ def run_demo(
     )
     lines = summary(progress, stages)
     if progress.curve.records:
-        saved, places = save_curve(progress.curve, folder)  # first: printing may fail as well
+        # First: printing may fail as well.
+        saved, places = save_curve(progress, folder)
         lines += places
         code = code if saved else 1
     else:
@@ -60,20 +60,22 @@ def run_demo(
     return code
 
 
-def save_curve(curve: LearningCurve, folder: Path) -> tuple[bool, list[str]]:
+def save_curve(progress: ProgressNode, folder: Path) -> tuple[bool, list[str]]:
     """Write the success curve as CSV and as a picture; return whether, and what to print.
 
     The rows of a table that cannot be written are printed: nothing else holds them.
     """
     # matplotlib is imported late: before the run it would delay the first node.
-    from ja_bringup.success_curve import as_csv, draw_png, write_csv
+    from ja_bringup.success_curve import CurveOrigin, as_csv, draw_png, write_csv
 
+    curve = progress.curve
+    origin = CurveOrigin(progress.track, progress.weight_files)
     lines = []
     try:
-        lines.append(f'success curve: {write_csv(curve, folder)}')
+        lines.append(f'success curve: {write_csv(curve, folder, origin)}')
         lines.append(f'               {draw_png(curve, folder, WINDOW_TRIALS)}')
     except OSError as error:
-        table = [] if lines else as_csv(curve).splitlines()
+        table = [] if lines else as_csv(curve, origin).splitlines()
         return False, [*table, *lines, f'error: {error}']
     return True, lines
 
@@ -100,4 +102,5 @@ def summary(progress: ProgressNode, stages: Sequence[Stage]) -> list[str]:
             f'success, {name + ":":28} {curve.rate(part, stage.name)}'
             for name, part in parts.items()
         ]
-    return [*lines, f'chance, one object of {progress.objects}: {1 / progress.objects:.2f}']
+    lines.append(f'chance, one object of {progress.objects}: {1 / progress.objects:.2f}')
+    return [*lines, f'track of the learner: {progress.track}'] if progress.track else lines

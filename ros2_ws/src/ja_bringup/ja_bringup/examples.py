@@ -7,12 +7,14 @@ EXAMPLES: dict[str, dict[str, str]] = {
         './ja demo': 'one minute: exam, practice, exam',
         './ja demo --learner paper --trials 2000 --time 600': "the paper's network needs more",
         './ja demo --scene default --record --one-process': 'a harder scene, all of it recorded',
+        './ja demo --senses eyes,depth': 'it reads her eyes, and has a depth camera',
         './ja demo --resume runs/X-demo': 'resume an earlier run with all that it learned',
         './ja demo --swap gate=my_lab/my_gate --ros-args -p max_shifts:=3': 'a node of yours',
     },
     'rig': {
         './ja rig --source 0': 'a webcam, and a digital head in its picture',
         './ja rig --source walk.mp4 --time 60 --no-view': 'a video file',
+        './ja rig --senses eyes --source 0': 'the learner reads her head pose and her eyes',
         './ja rig --record --ros-args -r image_raw:=/camera/image_raw': 'your camera and motors',
     },
     'figures': {

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from ja_common.core.files import check_file_writable, check_writable
 from ja_common.ros_arguments import check_ros_arguments
+from ja_recording.core.bag_metadata import read_metadata
 from ja_recording.core.dataset import TrialSample, write_dataset
 from ja_recording.core.reader import Recording, print_remarks
 from ja_recording.learner_score import ScoredTrial, score_learner, success_rate, write_csv
@@ -73,7 +74,11 @@ def export(paths: Sequence[Path], folder: Path, licence: str, arguments: Sequenc
                 for trial in recorded_trials(recording, arguments, advance):
                     yield sample_of(trial, path.resolve().name)
 
-    card = write_dataset(folder, samples(), arguments, licence)
+    origins = {
+        path.resolve().name: read_metadata(path if path.is_dir() else path.parent).custom_data
+        for path in paths
+    }
+    card = write_dataset(folder, samples(), arguments, licence, origins)
     print(f'the data set, and what is in it: {card}')
     return 0
 

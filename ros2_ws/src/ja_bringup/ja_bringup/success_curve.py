@@ -2,7 +2,8 @@
 
 import csv
 import io
-from dataclasses import asdict, fields
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
 import numpy as np
@@ -12,24 +13,46 @@ from matplotlib.figure import Figure
 
 from ja_common.core.files import write_file
 from ja_common.core.learning_curve import LearningCurve, TrialRecord
+from ja_common.core.weight_files import weight_files_text
 
 CSV_NAME = 'success_curve.csv'
 PNG_NAME = 'success_curve.png'
 
 
-def write_csv(curve: LearningCurve, folder: Path) -> Path:
+@dataclass(frozen=True)
+class CurveOrigin:
+    """What the learner of a curve started from: its track, and the weight files of the eyes.
+
+    `weight_files`: name -> SHA-256. Both empty where the graph did not publish them.
+    """
+
+    track: str = ''
+    weight_files: Mapping[str, str] = field(default_factory=dict)
+
+
+def write_csv(curve: LearningCurve, folder: Path, origin: CurveOrigin) -> Path:
     """Write one row for each trial; return the path. Raises SaveError."""
     path = folder / CSV_NAME
-    write_file(path, as_csv(curve))
+    write_file(path, as_csv(curve, origin))
     return path
 
 
-def as_csv(curve: LearningCurve) -> str:
-    """Return the table of the curve, one row for each trial."""
+def as_csv(curve: LearningCurve, origin: CurveOrigin) -> str:
+    """Return the table of the curve, one row for each trial.
+
+    Every row has the track and the weight files: rows of several runs can be put together.
+    """
+    started_from = {
+        'track': origin.track,
+        'weight_files': weight_files_text(origin.weight_files),
+    }
     text = io.StringIO(newline='')
-    writer = csv.DictWriter(text, [field.name for field in fields(TrialRecord)])
+    names = [each.name for each in fields(TrialRecord)]
+    writer = csv.DictWriter(text, [*names, *started_from])
     writer.writeheader()
-    writer.writerows({**asdict(r), 'success': int(r.success)} for r in curve.records)
+    writer.writerows(
+        {**asdict(r), 'success': int(r.success), **started_from} for r in curve.records
+    )
     return text.getvalue()
 
 

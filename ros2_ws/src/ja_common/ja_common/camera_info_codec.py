@@ -8,11 +8,17 @@ from ja_common.core.camera_model import CameraModel
 
 
 def encode_camera_info(
-    header: Header, width: int, height: int, fx: float, fy: float | None = None
+    header: Header,
+    width: int,
+    height: int,
+    fx: float,
+    fy: float | None = None,
+    baseline_m: float = 0.0,
 ) -> CameraInfo:
     """Return the calibration of an ideal camera: axis through the centre, no distortion.
 
-    `fx`, `fy`: focal lengths [px]; the pixels are square where only one is given.
+    `fx`, `fy`: focal lengths [px]; the pixels are square where only one is given. `baseline_m`:
+    how far this camera stands to the right of the one that it is paired with.
     """
     fy = fx if fy is None else fy
     cx, cy = (width - 1) / 2, (height - 1) / 2
@@ -20,7 +26,7 @@ def encode_camera_info(
     info.distortion_model, info.d = 'plumb_bob', [0.0] * 5
     info.k = [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]
     info.r = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-    info.p = [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]
+    info.p = [fx, 0.0, cx, 0.0 - fx * baseline_m, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]
     return info
 
 

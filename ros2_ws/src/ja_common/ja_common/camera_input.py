@@ -61,7 +61,8 @@ class CameraInput:
     """Decodes the images and the calibration of one camera; ``image_topic`` is resolved."""
 
     def __init__(self, config: CameraInputConfig, image_topic: str) -> None:
-        self._quarter_turns = config.image_rotation_deg // 90
+        self.quarter_turns = config.image_rotation_deg // 90
+        """How often the images are turned clockwise by 90 degrees to be upright."""
         self._turn = _TURNS.get(config.image_rotation_deg)
         self._depth = SampleDepth(config.significant_bits)
         self.rectified = config.image_geometry == 'rectified' or (
@@ -93,7 +94,7 @@ class CameraInput:
 
     def as_mounted(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return an upright picture (H, W, 3) as the camera would deliver it."""
-        back = _TURNS.get(360 - 90 * self._quarter_turns)
+        back = _TURNS.get(360 - 90 * self.quarter_turns)
         return picture if back is None else cv2.rotate(picture, back)
 
     def camera(self, picture: NDArray[np.uint8]) -> CameraModel | None:
@@ -104,10 +105,10 @@ class CameraInput:
         if self._calibration is None:
             return None
         height, width = picture.shape[:2]
-        if self._quarter_turns % 2:
+        if self.quarter_turns % 2:
             height, width = width, height
         camera = self._calibration.camera(width, height, self.rectified)
-        return None if camera is None else camera.turned(self._quarter_turns)
+        return None if camera is None else camera.turned(self.quarter_turns)
 
     def upright_header(self, header: Header) -> Header:
         """Return the header of what is measured in the upright picture.

@@ -5,12 +5,20 @@ from typing import Any
 
 from ja_common.core.stamps import NS_PER_S
 from ja_common.time_codec import to_ns
-from ja_common.topics import IMAGE, IMAGE_COMPRESSED, JOINT_STATES, WIDE_IMAGE, Topic
+from ja_common.topics import (
+    DEPTH,
+    IMAGE,
+    IMAGE_COMPRESSED,
+    JOINT_STATES,
+    RIGHT_IMAGE,
+    WIDE_IMAGE,
+    Topic,
+)
 
 OTHER_CLOCK_S = 60.0
 """No message is under way for so long [s]: what is stamped this far off has another clock."""
 
-_FROM_SENSORS = (IMAGE, IMAGE_COMPRESSED, WIDE_IMAGE, JOINT_STATES)
+_FROM_SENSORS = (IMAGE, IMAGE_COMPRESSED, WIDE_IMAGE, DEPTH, RIGHT_IMAGE, JOINT_STATES)
 
 
 def watch_stamps(

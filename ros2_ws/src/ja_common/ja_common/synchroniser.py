@@ -1,9 +1,10 @@
 """Calls a node with the messages of one stamp and the posture at that stamp, in stamp order."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import combinations
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
@@ -63,7 +64,8 @@ class Synchroniser:
 
     A set whose posture never becomes known is dropped, and the node's health reports it. With
     `patience_s` [s] it is called all the same, without a posture, after that time: for a camera
-    that may stand still. `is_calibrated` then holds sets back as well, for as long.
+    that may stand still. `is_calibrated` then holds sets back as well, for as long, and so does
+    `must_wait` for as long as it returns True of a stamp [ns] and the time waited [s].
     """
 
     def __init__(
@@ -74,11 +76,12 @@ class Synchroniser:
         joints_expected_every_s: float = 2.0,
         patience_s: float | None = None,
         is_calibrated: Callable[[], bool] = lambda: True,
+        must_wait: Callable[[int, float], bool] = lambda stamp_ns, waited_s: False,
     ) -> None:
         """`joints`: decodes the joint states; None: the callbacks need no posture."""
         self._node = node
         self._postures: PostureReader | None = None
-        self._is_calibrated = is_calibrated
+        self._is_calibrated, self._must_wait = is_calibrated, must_wait
         self._history = PostureHistory()
         self._patient: PatientQueue[tuple[Callback, StampedSet]] | None = None
         self._joins: list[StampJoin] = []
@@ -116,13 +119,13 @@ class Synchroniser:
         callback: Callback,
         *,
         also: Mapping[Topic, Callable[[Any], Any]] | None = None,
-        also_when: Callable[[Any], bool] = lambda _: False,
+        also_which: Callable[[Any], Collection[Topic]] = lambda _: (),
         expected_every_s: float | None = 2.0,
     ) -> None:
         """Call `callback` with one message of each topic of a stamp, decoded by its decoder.
 
-        `also`: further topics that belong to the set of some stamps only: those where
-        `also_when` holds for the value of the first topic. `expected_every_s` [s]: silence of a
+        `also`: further topics that belong to the set of some stamps only: those that
+        `also_which` returns for the value of the first topic. `expected_every_s` [s]: silence of a
         topic of `decoders` for longer is a warning. Sets that are asked for first are called
         first. A decoder raises ValueError for a message that cannot be used.
         """
@@ -132,7 +135,12 @@ class Synchroniser:
             self._dispatcher = StampOrderedDispatcher([str(i) for i in range(index + 1)])
         first, *_ = decoders
         base = StampJoin([topic.name for topic in decoders])
-        whole = StampJoin([topic.name for topic in (*decoders, *(also or {}))])
+        # What a message of `also` belongs to is known only when the others have come.
+        wholes: dict[frozenset[str], StampJoin] = {}
+        for count in range(1, len(also or {}) + 1):
+            for some in combinations(also or {}, count):
+                names = [topic.name for topic in (*decoders, *some)]
+                wholes[frozenset(topic.name for topic in some)] = StampJoin(names)
         self._joins.append(base)
         topics = {topic.name: topic for topic in (*decoders, *(also or {}))}
 
@@ -146,15 +154,19 @@ class Synchroniser:
                 found = base.collect_value(topic.name, stamp_ns, value)
                 if found is None:
                     return
-                if not (also and also_when(found[first.name])):
+                which = frozenset(each.name for each in also_which(found[first.name]))
+                if not which:
                     complete(message, stamp_ns, found)
                     return
+                joins = [wholes[which]]
             else:
                 found = {topic.name: value}
-            for name, each in found.items():
-                joined = whole.collect_value(name, stamp_ns, each)
-                if joined is not None:
-                    complete(message, stamp_ns, joined)
+                joins = [join for names, join in wholes.items() if topic.name in names]
+            for join in joins:
+                for name, each in found.items():
+                    joined = join.collect_value(name, stamp_ns, each)
+                    if joined is not None:
+                        complete(message, stamp_ns, joined)
 
         for topic, decode in decoders.items():
             self._node.subscribe(topic, partial(collect, topic, decode), expected_every_s)
@@ -180,10 +192,10 @@ class Synchroniser:
             self._dispatcher.queue_action(str(index), found.stamp_ns, call)
 
     def call_ready(self) -> None:
-        """Call the sets whose waiting is over; for a node whose calibration has come."""
+        """Call the sets whose waiting is over; for a node that has got what they wait for."""
         if self._patient is not None:
             for (call, found), _, posture in self._patient.pop_ready(
-                self._is_calibrated(), time.monotonic()
+                self._is_calibrated(), time.monotonic(), self._must_wait
             ):
                 if posture is None:
                     self._report_late_joints(found.stamp_ns)

@@ -99,6 +99,12 @@ IMAGE_ANNOTATED = Topic(
     'the picture with the detections drawn in; published while a subscriber exists',
     **_PICTURE,
 )
+WEIGHT_FILES = Topic(
+    'weight_files',
+    DiagnosticStatus,
+    'files of learned weights that the eyes of this graph have opened: name -> SHA-256',
+    **_LATCHED,
+)
 VF_DELTA = Topic(
     'visual_feedback/delta', JointState, 'change of posture towards the target (Eq. 2)', **_LINK
 )
@@ -128,6 +134,12 @@ BELIEF = Topic(
     PointCloud2,
     'samples of where the learner believes she looks: pan, tilt, weight; while subscribed',
     **_LINK,
+)
+TRACK = Topic(
+    'learning_module/track',
+    String,
+    'what the learner starts from: strict or landmarks, each with depth once it has used ranges',
+    **_LATCHED,
 )
 FIXATION = Topic(
     'fixation',

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import cv2
@@ -18,6 +18,7 @@ from ja_common.core.detection import Detection
 from ja_common.core.fixation import WIDTH_SIXTH
 from ja_common.core.geometry import directions_of_rays
 from ja_common.detection_codec import decode_detections
+from ja_common.face_gaze_codec import decode_face_gaze
 from ja_common.graph_node import GraphNode
 from ja_common.image_codec import decode_image
 from ja_common.joint_codec import JointCodec
@@ -29,7 +30,9 @@ from ja_common.topics import (
     BELIEF,
     CAMERA_INFO,
     DETECTIONS,
+    FACE_GAZE,
     FACE_IMAGE,
+    FACE_LANDMARKS,
     FIXATION,
     IMAGE,
     JOINT_COMMANDS,
@@ -39,6 +42,7 @@ from ja_common.topics import (
     VF_DELTA,
     Topic,
 )
+from ja_dashboard.core.gaze_view import GazeView, draw_gaze
 from ja_dashboard.core.view_model import SceneView, TruthView, ViewModel
 
 MESSAGES_PER_POLL = 50
@@ -50,6 +54,9 @@ _DEPTHS = {
         MESSAGES_PER_POLL,
     ),
 }
+_OPTIONAL = (FACE_GAZE, FACE_LANDMARKS)
+"""Topics of senses that most graphs lack: subscribed once they have a publisher."""
+_LOOK_FOR_SENSES_EVERY_S = 1.0
 _STEPS = (DETECTIONS, VF_DELTA, LM_DELTA, FIXATION, JOINT_COMMANDS)
 """The topics that follow from an image, in their order."""
 _ASSUMED_VIEW_RAD = math.radians(36)
@@ -70,12 +77,15 @@ class Picture:
     face_image: NDArray[np.uint8] | None
     camera: CameraModel
     latency_s: float
+    gaze: GazeView = field(default_factory=GazeView)
 
     def jpeg(self) -> bytes:
-        """Return the image as JPEG with boxes, centre circle and face crop."""
+        """Return the image as JPEG with boxes, centre circle, face crop, landmarks and gaze."""
         drawn = annotate_image(
             self.image, self.detections, self.face_image, self.camera, WIDTH_SIXTH, self.latency_s
         )
+        scale = drawn.shape[1] / self.image.shape[1]
+        draw_gaze(drawn, self.gaze, self.detections, scale)
         quality = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
         return cv2.imencode('.jpg', cv2.cvtColor(drawn, cv2.COLOR_RGB2BGR), quality)[1].tobytes()
 
@@ -103,6 +113,7 @@ class ImageFeed:
         self._command: NDArray[np.float64] | None = None
         self._belief = np.zeros((0, 3))
         self._truth: TruthView | None = None
+        self._looked_for_senses_s = -math.inf
         self.limits = np.radians([[-60.0, -35.0], [60.0, 35.0]])
         self.picture: Picture | None = None
         self.scene: SceneView | None = None
@@ -127,6 +138,7 @@ class ImageFeed:
 
         An image is shown once its detections have come.
         """
+        self._subscribe_senses(now_s)
         taken = {
             topic: subscription.take_messages()
             for topic, subscription in self.subscriptions.items()
@@ -146,6 +158,19 @@ class ImageFeed:
             self.scene = replace(
                 self.scene, command=self._command, belief=self._belief, truth=self._truth
             )
+
+    def _subscribe_senses(self, now_s: float) -> None:
+        """Subscribe to the topics of the senses that this graph has, and leave those it lost."""
+        if now_s - self._looked_for_senses_s < _LOOK_FOR_SENSES_EVERY_S:
+            return
+        self._looked_for_senses_s = now_s
+        for topic in _OPTIONAL:
+            exists = self._node.count_publishers(topic.name) > 0
+            if exists and topic not in self.subscriptions:
+                subscription = PolledSubscription(self._node, topic, MESSAGES_PER_POLL)
+                self.subscriptions[topic] = subscription
+            elif not exists and topic in self.subscriptions:
+                self.subscriptions.pop(topic).close()
 
     def _measure_latencies(self, taken: Mapping[Topic, list[tuple[Any, int]]]) -> None:
         """Measure how long after an image each node published its result."""
@@ -189,7 +214,10 @@ class ImageFeed:
 
     def _show_images(self, now_s: float, taken: Mapping[Topic, list[tuple[Any, int]]]) -> None:
         found = {to_ns(message.header.stamp): message for message, _ in taken[DETECTIONS]}
-        faces = {to_ns(message.header.stamp): message for message, _ in taken[FACE_IMAGE]}
+        faces, gazes, landmarks = (
+            {to_ns(message.header.stamp): message for message, _ in taken.get(topic, [])}
+            for topic in (FACE_IMAGE, *_OPTIONAL)
+        )
         pending = [] if self._pending is None else [self._pending]
         for message, _ in taken[IMAGE]:
             stamp_ns = to_ns(message.header.stamp)
@@ -200,11 +228,21 @@ class ImageFeed:
             if stamp_ns in found:
                 self._pending = None
                 detections, face = found[stamp_ns], faces.get(stamp_ns)
+                gaze = self._gaze_view(gazes.get(stamp_ns), landmarks.get(stamp_ns))
                 self._node.call_guarded(
-                    IMAGE.name, self._show, stamp_ns, message, detections, face
+                    IMAGE.name, self._show, stamp_ns, message, detections, face, gaze
                 )
 
-    def _show(self, stamp_ns: int, message: Any, found: PointCloud2, face: Any) -> None:
+    def _gaze_view(self, gaze: Any, landmarks: Any) -> GazeView:
+        points = None
+        if landmarks is not None:
+            points = self._decoded(FACE_LANDMARKS, _shown_points, landmarks)
+        read = None if gaze is None else self._decoded(FACE_GAZE, decode_face_gaze, gaze)
+        return GazeView(np.zeros((0, 2)) if points is None else points, read)
+
+    def _show(
+        self, stamp_ns: int, message: Any, found: PointCloud2, face: Any, gaze: GazeView
+    ) -> None:
         _check_size(message)
         image = self._camera.decode(message)
         detections: list[Detection] = self._decoded(DETECTIONS, _shown_detections, found) or []
@@ -221,9 +259,10 @@ class ImageFeed:
             posture=posture,
             detections=detections if posture is not None else [],
             directions=np.zeros((0, 2)) if posture is None else directions_of_rays(posture, rays),
+            gaze=gaze.direction,
         )  # fmt: skip
         grey = None if face_image is None else face_image[..., 0]
-        self.picture = Picture(stamp_ns, image, detections, grey, camera, latency_s)
+        self.picture = Picture(stamp_ns, image, detections, grey, camera, latency_s, gaze)
 
     def _decoded(self, topic: Topic, decode: Callable[[Any], Any], message: Any) -> Any:
         """Return what a message holds; None where it cannot be decoded."""
@@ -254,6 +293,10 @@ def _check_size(message: Image) -> None:
 def _shown_detections(message: PointCloud2) -> list[Detection]:
     _check_count(message)
     return decode_detections(message)
+
+
+def _shown_points(message: PointCloud2) -> NDArray[np.float64]:
+    return np.column_stack(list(_shown_columns(message, ('u', 'v')).values())).astype(float)
 
 
 def _shown_columns(message: PointCloud2, names: Sequence[str]) -> dict[str, NDArray[np.float32]]:

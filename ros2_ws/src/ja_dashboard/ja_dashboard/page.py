@@ -32,7 +32,8 @@ _STYLE = """
               margin: 0 0 6px; line-height: 1.4 }
 .ja-old { filter: grayscale(1) brightness(.45) }
 .ja-facts { display: grid; grid-template-columns: auto 1fr; gap: 2px 14px; font-size: .9rem }
-.ja-facts dt { color: #94a3b8 } .ja-facts dd { margin: 0; font-variant-numeric: tabular-nums }
+.ja-facts dt { color: #94a3b8 } .ja-facts dd { margin: 0; font-variant-numeric: tabular-nums;
+                                        min-width: 0; overflow-wrap: anywhere }
 .ja-nodes { width: 100%; font-size: .82rem; border-spacing: 0 3px; border-collapse: separate }
 .ja-nodes td { vertical-align: top; padding-right: 8px; overflow-wrap: anywhere }
 .ja-light { display: inline-block; width: .7em; height: .7em; border-radius: 50% }
@@ -90,7 +91,8 @@ class _OpenPage:
                 self._scene = ui.html(sanitize=False).classes('w-full')
                 ui.label(
                     'Orange: detected objects. Yellow: her face. Violet: belief of the learner. '
-                    'Green: the truth. A camera measures directions; the distance is arbitrary.'
+                    'Green: the truth. Pink: her gaze, as read from landmarks. Without a range '
+                    'the distance is arbitrary: a camera measures directions.'
                 ).classes('ja-quiet text-xs')
             with self._card('Pan and tilt within their limits'):
                 self._postures = ui.html(sanitize=False).classes('w-full')

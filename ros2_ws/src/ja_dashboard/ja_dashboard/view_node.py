@@ -18,6 +18,7 @@ from rclpy.logging import LoggingSeverity
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
+from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from ja_common.camera_input import CameraInputConfig
@@ -30,7 +31,17 @@ from ja_common.node_main import spin_node
 from ja_common.parameters import choices_of
 from ja_common.polled_subscription import PolledSubscription
 from ja_common.status_values import status_values
-from ja_common.topics import DIAGNOSTICS, EVERY_SCORE, FIXATION, GATE_STATUS, LOG, Topic
+from ja_common.topics import (
+    DIAGNOSTICS,
+    EVERY_SCORE,
+    FIXATION,
+    GATE_STATUS,
+    LOG,
+    TRACK,
+    WEIGHT_FILES,
+    Topic,
+)
+from ja_common.weight_files_codec import decode_weight_files
 from ja_dashboard.core.view_model import CurvePoints, NodeHealth, SceneView, State, ViewModel
 from ja_dashboard.image_feed import LIMITS, MESSAGES_PER_POLL, ImageFeed, Picture
 
@@ -115,6 +126,8 @@ class ViewNode(GraphNode):
         self.subscribe(EVERY_SCORE, self._on_score)
         self.subscribe(DIAGNOSTICS, self._on_diagnostics)
         self.subscribe(LOG, self._on_log)
+        self.subscribe(TRACK, self._on_track)
+        self.subscribe(WEIGHT_FILES, self._on_weight_files)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(POLL_EVERY_S, self._poll, clock=steady)
         self.create_timer(_ASK_EVERY_S, self._ask_parameters, clock=steady)
@@ -226,6 +239,12 @@ class ViewNode(GraphNode):
     def _on_log(self, message: Log) -> None:
         if message.level >= LoggingSeverity.INFO:
             self._model.append_log(f'{message.name}: {message.msg}')
+
+    def _on_track(self, message: String) -> None:
+        self._model.track = message.data
+
+    def _on_weight_files(self, message: DiagnosticStatus) -> None:
+        self._model.weight_files = decode_weight_files(message)
 
     def _call(self, client: Any, name: str, request: Any) -> None:
         if not client.service_is_ready():

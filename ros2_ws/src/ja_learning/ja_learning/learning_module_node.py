@@ -11,10 +11,11 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 from ja_common.core.config import Configuration, parameter
-from ja_common.core.detection import Detection, caregiver_face, objects
+from ja_common.core.detection import Detection, caregiver_face
 from ja_common.core.health import Level
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_common.detection_codec import decode_detections
+from ja_common.face_gaze_codec import decode_face_gaze
 from ja_common.graph_node import GraphNode
 from ja_common.image_codec import decode_image
 from ja_common.joint_codec import JointCodec, JointConfig
@@ -26,10 +27,12 @@ from ja_common.topics import (
     BELIEF,
     DETECTIONS,
     EVIDENCE,
+    FACE_GAZE,
     FACE_IMAGE,
     FIXATION,
     GLANCE_DELTA,
     LM_DELTA,
+    Topic,
 )
 from ja_learning.core.learner import Learner
 from ja_learning.core.learner_registry import LEARNERS, LearnerChoice, make_learner
@@ -100,8 +103,8 @@ class LearningModuleNode(GraphNode):
         synchroniser.call_with(
             {DETECTIONS: decode_detections},
             self._propose,
-            also={FACE_IMAGE: _decode_face},
-            also_when=_shows_attended_face,
+            also={FACE_IMAGE: _decode_face, FACE_GAZE: decode_face_gaze},
+            also_which=_companions,
         )
         synchroniser.call_with({FIXATION: self._joints.decode}, self._take_fixation)
         self._delta = self.create_topic_publisher(LM_DELTA)
@@ -136,11 +139,10 @@ class LearningModuleNode(GraphNode):
             self._pipeline.drop_trial()
 
     def _propose(self, found: StampedSet) -> None:
-        header, detections = found.header, found[DETECTIONS]
-        rays = np.array([seen.ray for seen in objects(detections)]).reshape(-1, 2)
-        face = caregiver_face(detections)
-        attended = (found[FACE_IMAGE], face.ray) if face is not None and face.attended else None
-        proposal = self._pipeline.process_image(found.posture, rays, attended)
+        header, detections = found.header, self._learner.allowed(found[DETECTIONS])
+        # They belong to the set where the detections name them.
+        face, gaze = found.values.get(FACE_IMAGE), found.values.get(FACE_GAZE)
+        proposal = self._pipeline.process_image(found.posture, detections, face, gaze)
         self._delta.publish(self._joints.encode(header, proposal.delta))
         self._glance_delta.publish(self._joints.encode(header, proposal.glance))
         evidence = {'log_evidence': [proposal.log_evidence]}
@@ -192,9 +194,12 @@ def _decode_face(message: Image) -> np.ndarray:
     return checked_face(decode_image(message)[..., 0])
 
 
-def _shows_attended_face(detections: list[Detection]) -> bool:
+def _companions(detections: list[Detection]) -> list[Topic]:
+    """Return the topics that have a message of the same stamp as these detections."""
     face = caregiver_face(detections)
-    return face is not None and face.attended
+    if face is None or not face.attended:
+        return []
+    return [FACE_IMAGE, FACE_GAZE] if face.gaze_read else [FACE_IMAGE]
 
 
 def _share_the_interpreter() -> None:

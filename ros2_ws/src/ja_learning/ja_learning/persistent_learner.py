@@ -5,16 +5,22 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock, ClockType
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from ja_common.core.background_save import RETRY_S
+from ja_common.core.detection import Detection
 from ja_common.core.health import Level
 from ja_common.graph_node import GraphNode
 from ja_common.realtime import use_default_scheduling
+from ja_common.topics import TRACK, WEIGHT_FILES
+from ja_common.weight_files_codec import decode_weight_files
 from ja_learning.core.background_learner import BackgroundLearner
 from ja_learning.core.checkpoint_folder import CheckpointConfig, CheckpointFolder, Resumed
 from ja_learning.core.learner import Learner, Predictor
+from ja_learning.core.track import Origin, Track, TrackConfig
 from ja_learning.core.trial import Trial
 
 MANY_WAITING = 10
@@ -41,9 +47,13 @@ class PersistentLearner:
         """
         self._node = node
         self._make = make
+        self._origin = Origin(node.configure(TrackConfig))
+        self._track_publisher = node.create_topic_publisher(TRACK)
+        self._published_track: Track | None = None
         self._behind = BEHIND_IN_LOCKSTEP if lockstep else None
         self._checkpoints = self._open(node.configure(CheckpointConfig))
         learner = make()
+        self._config = learner.config
         if self._checkpoints is not None and self._checkpoints.config.resume:
             self._resume(learner)
         self._background = self._in_background(learner)
@@ -55,11 +65,24 @@ class PersistentLearner:
         self.report_health()
         node.advertise_service(Trigger, 'save_checkpoint', self._on_save)
         node.advertise_service(Trigger, 'load_checkpoint', self._on_load)
+        node.subscribe(WEIGHT_FILES, self._on_weight_files)
+        self._publish_track()
 
     @property
     def predictor(self) -> Predictor:
         """Return what is believed now; in lockstep, what was believed a trial ago."""
         return self._background.predictor
+
+    @property
+    def track(self) -> Track:
+        """Return what the learner has started from, and whether it has used ranges."""
+        return self._origin.track(self._config)
+
+    def allowed(self, detections: list[Detection]) -> list[Detection]:
+        """Return the detections with the ranges that the learner may use (`use_ranges`)."""
+        allowed = self._origin.allowed(detections)
+        self._publish_track()
+        return allowed
 
     def update(self, trial: Trial) -> None:
         """Hand over a finished trial; return at once."""
@@ -68,9 +91,12 @@ class PersistentLearner:
     def reset(self) -> None:
         """Forget everything, in the newest checkpoint too; `load_checkpoint` can go back."""
         forgotten = self._replace(self._make())
+        if self._checkpoints is not None:
+            self._try(self._checkpoints.save_when_changed, forgotten)
+        self._origin.reset()
+        self._publish_track()
         if self._checkpoints is None:
             return
-        self._try(self._checkpoints.save_when_changed, forgotten)
         self._background.call_with_learner(self._save_reset)
         if self._unsaved:
             text = f'a restart would bring back what was forgotten: {self._unsaved}'
@@ -106,7 +132,8 @@ class PersistentLearner:
     def _open(self, config: CheckpointConfig) -> CheckpointFolder | None:
         if not config.checkpoint_folder:
             return None
-        return CheckpointFolder(self._node.namespaced_folder(config.checkpoint_folder), config)
+        folder = self._node.namespaced_folder(config.checkpoint_folder)
+        return CheckpointFolder(folder, config, self._origin)
 
     def _in_background(self, learner: Learner) -> BackgroundLearner:
         # An update is not urgent, even where answers are (`realtime_priority`).
@@ -115,6 +142,7 @@ class PersistentLearner:
     def _replace(self, learner: Learner) -> Learner:
         """Continue with another learner; return the one before."""
         before = self._background.close(0.0)
+        self._config = learner.config
         self._background = self._in_background(learner)
         return before
 
@@ -165,7 +193,23 @@ class PersistentLearner:
             self._node.report_problem('checkpoints', f'refused: {text}', Level.WARN)
         if path is not None:
             self._node.get_logger().info(f'goes on from {path}, {learner.trials} trials')
+            self._report_weight_files(self._origin.changed_weight_files())
         return path
+
+    def _publish_track(self) -> None:
+        """Publish the track when it has changed; late subscribers get the last one."""
+        track = self.track
+        if track != self._published_track:
+            self._published_track = track
+            self._track_publisher.publish(String(data=str(track)))
+
+    def _on_weight_files(self, message: DiagnosticStatus) -> None:
+        self._report_weight_files(self._origin.set_weight_files(decode_weight_files(message)))
+
+    def _report_weight_files(self, changes: str) -> None:
+        if changes:
+            text = f'what was learned is of other weight files of the eyes: {changes}'
+            self._node.report_problem('weight files', text, Level.WARN)
 
     def _on_save(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         path = self._background.call_with_learner(self._kept_in().save)
@@ -179,6 +223,7 @@ class PersistentLearner:
         if path is None:
             raise ValueError(f'no checkpoint in {self._kept_in().folder}')
         self._replace(learner)
+        self._publish_track()
         response.message = f'{self._background.trials} trials loaded from {path}'
         response.success = True
         return response

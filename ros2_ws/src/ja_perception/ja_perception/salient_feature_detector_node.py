@@ -16,28 +16,37 @@ from std_msgs.msg import Header
 from ja_common.camera_input import CameraInput, CameraInputConfig
 from ja_common.core.annotate import annotate_image
 from ja_common.core.camera_model import CameraModel
-from ja_common.core.config import Configuration, parameter
+from ja_common.core.config import ConfigError, Configuration, parameter
 from ja_common.core.detection import Detection, caregiver_face
 from ja_common.core.health import Level
 from ja_common.core.picture_watch import PictureWatch
+from ja_common.core.weight_files import note_weight_files
 from ja_common.detection_codec import encode_detections
+from ja_common.face_gaze_codec import encode_face_gaze
 from ja_common.graph_node import GraphNode
 from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.node_main import spin_node
+from ja_common.point_cloud_codec import encode_columns
 from ja_common.synchroniser import StampedSet, Synchroniser
 from ja_common.topics import (
     CAMERA_INFO,
     DETECTIONS,
     FACE,
+    FACE_GAZE,
     FACE_IMAGE,
+    FACE_LANDMARKS,
     IMAGE,
     IMAGE_ANNOTATED,
     IMAGE_COMPRESSED,
     TARGET,
+    WEIGHT_FILES,
 )
+from ja_common.weight_files_codec import encode_weight_files
 from ja_perception.core.detector import DetectorConfig, Percept, SalientFeatureDetector
 from ja_perception.core.face_finders import FACE_FINDERS
+from ja_perception.core.gaze_reader import GazeReader
+from ja_perception.range_input import RangeConfig, RangeInput
 
 
 @dataclass(frozen=True)
@@ -48,6 +57,9 @@ class InputConfig(Configuration):
         'blazeface', 'how faces are found: a network, a cascade, or the template of the paper',
         choices=tuple(FACE_FINDERS),
     )  # fmt: skip
+    read_gaze: bool = parameter(
+        False, 'publish head pose and eyes of the attended face (face_gaze), by landmarks'
+    )
     compressed: bool = parameter(False, 'subscribe to image_raw/compressed instead of image_raw')
     field_of_view_rad: float = parameter(
         math.radians(36), 'horizontal view of a camera that sends no calibration',
@@ -71,11 +83,13 @@ class SalientFeatureDetectorNode(GraphNode):
         cv2.setNumThreads(1)
         self._input = self.configure(InputConfig)
         self._joints = JointCodec(self.configure(JointConfig))
-        self._finder = FACE_FINDERS[self._input.face_finder]()
+        with note_weight_files() as weight_files:
+            self._finder = FACE_FINDERS[self._input.face_finder]()
+            self._gaze_reader = self._make_gaze_reader()
         self._config = DetectorConfig(
             **{part.name: self._tunable(part) for part in fields(DetectorConfig)}
         )
-        self._detector = SalientFeatureDetector(self._finder, self._config)
+        self._detector = self._make_detector()
         self._newest_percept: tuple[int, Percept] | None = None
         self._image_topic = IMAGE_COMPRESSED if self._input.compressed else IMAGE
         self._camera = CameraInput(
@@ -89,13 +103,27 @@ class SalientFeatureDetectorNode(GraphNode):
             joints_expected_every_s=silent_after_s,
             patience_s=self._input.posture_wait_s,
             is_calibrated=lambda: self._camera.has_calibration,
+            must_wait=lambda stamp_ns, waited_s: self._ranges.must_wait(stamp_ns, waited_s),
+        )
+        self._ranges = RangeInput(
+            self,
+            self.configure(RangeConfig),
+            self._camera,
+            self._synchroniser.call_ready,
+            silent_after_s,
         )
 
         self._detections_publisher = self.create_topic_publisher(DETECTIONS)
         self._target_publisher = self.create_topic_publisher(TARGET)
         self._face_publisher = self.create_topic_publisher(FACE)
         self._face_image_publisher = self.create_topic_publisher(FACE_IMAGE)
+        self._face_gaze_publisher = self.create_topic_publisher(FACE_GAZE)
+        self._landmarks_publisher = self.create_topic_publisher(FACE_LANDMARKS)
         self._annotated_publisher = self.create_topic_publisher(IMAGE_ANNOTATED)
+        self._weight_files_publisher = self.create_topic_publisher(WEIGHT_FILES)
+        self._weight_files_publisher.publish(
+            encode_weight_files(self.get_fully_qualified_name(), weight_files)
+        )
         self.subscribe(CAMERA_INFO, self._on_camera_info, silent_after_s)
         self._synchroniser.call_with(
             {self._image_topic: lambda message: message},
@@ -108,10 +136,24 @@ class SalientFeatureDetectorNode(GraphNode):
 
         def changed(config: Any) -> None:
             self._config = replace(self._config, **{part.name: config})
-            self._detector = SalientFeatureDetector(self._finder, self._config)
+            self._detector = self._make_detector()
             self._newest_percept = None
 
         return self.configure(part.default_factory, changed)  # type: ignore[arg-type]
+
+    def _make_detector(self) -> SalientFeatureDetector:
+        return SalientFeatureDetector(self._finder, self._config, self._gaze_reader)
+
+    def _make_gaze_reader(self) -> GazeReader | None:
+        """Return the reader of gaze; None, with a problem reported, if OpenCV cannot run it."""
+        self._no_gaze_because = ''
+        if self._input.read_gaze:
+            try:
+                return GazeReader()
+            except ConfigError as error:
+                self._no_gaze_because = str(error)
+                self.report_problem('gaze', self._no_gaze_because, Level.WARN)
+        return None
 
     def _on_camera_info(self, message: CameraInfo) -> None:
         self._camera.record_camera_info(message)
@@ -130,15 +172,18 @@ class SalientFeatureDetectorNode(GraphNode):
                 'still, and no face counts as attended',
                 Level.WARN,
             )
+        if self._no_gaze_because:
+            self.report_problem('gaze', self._no_gaze_because, Level.WARN)
         start = time.perf_counter()
         image = self._camera.decode(message)
         if problem := self._watch.record_picture(image, time.monotonic()):
             self.report_problem('picture', problem, Level.WARN)
         camera = self._camera_of(image)
         if self._newest_percept is None or self._newest_percept[0] != stamp_ns:
+            depth = self._ranges.sensor_at(stamp_ns, image, camera)
             self._newest_percept = (
                 stamp_ns,
-                self._detector.detect(image, stamp_ns, camera, posture),
+                self._detector.detect(image, stamp_ns, camera, posture, depth),
             )
         # The same image again (a sim that lost the answer): the same answer again.
         percept = self._newest_percept[1]
@@ -146,15 +191,23 @@ class SalientFeatureDetectorNode(GraphNode):
         self._publish_percept(header, percept)
         seconds = time.perf_counter() - start
         self.health.values['time an image [ms]'] = f'{1000 * seconds:.2f}'
+        if self._ranges.is_chosen:
+            known = sum(math.isfinite(each.range_m) for each in percept.detections)
+            self.health.values['detections with a range'] = f'{known} of {len(percept.detections)}'
         if self._annotated_publisher.get_subscription_count():
             self._publish_annotated(header, image, percept, camera, seconds)
 
     def _publish_percept(self, header: Header, percept: Percept) -> None:
-        # The face image goes first: a node that reads `attended` can rely on it.
+        # Face image and gaze go first: a node that reads `attended`, `gaze_read` can rely on them.
         if percept.face_image is not None:
             self._face_image_publisher.publish(
                 encode_image(percept.face_image, header.stamp, header.frame_id)
             )
+        if (reading := percept.gaze_reading) is not None:
+            self._face_gaze_publisher.publish(encode_face_gaze(header, reading.gaze))
+            if self._landmarks_publisher.get_subscription_count():
+                u, v = reading.landmarks.T
+                self._landmarks_publisher.publish(encode_columns(header, {'u': u, 'v': v}))
         self._detections_publisher.publish(encode_detections(header, percept.detections))
         # For displays only: mostly no node subscribes.
         for publisher, detection in (

@@ -18,7 +18,10 @@ from ja_common.graph_node import GraphNode
 from ja_common.message_types import message_class, schema_of
 from ja_common.node_main import spin_node
 from ja_common.qos_text import common_profile, offered_text
+from ja_common.topics import Topic
 from ja_recording.background_writer import BackgroundWriter, QueuedMessage
+from ja_recording.core.default_exclude import DEFAULT_EXCLUDE
+from ja_recording.recorded_origin import origin_text, origin_topic
 from ja_recording.recording_folder import Channel, Limits, RecordingFolder
 
 _POLL_PERIOD_S = 0.2
@@ -30,9 +33,8 @@ class RecorderConfig(Configuration):
     """The topics to record, the folder, and how much of the recording to keep."""
 
     folder: str = parameter('', 'folder of the recording; empty: runs/<time>-record')
-    # A subscriber to the annotated image makes the detector draw it.
     exclude: str = parameter(
-        'image_annotated', 'regular expression: topics that it matches anywhere are left out'
+        DEFAULT_EXCLUDE, 'regular expression: topics that it matches anywhere are left out'
     )
     split_mb: float = parameter(256.0, 'begin a new file beyond so many MB; 0: never', low=0.0)
     split_s: float = parameter(600.0, 'begin a new file after so many seconds; 0: never', low=0.0)
@@ -56,9 +58,8 @@ class RecorderNode(GraphNode):
         given = Path(config.folder).expanduser() if config.folder else None
         self.folder = given or new_run_folder('record')
         limits = Limits(config.split_mb, config.split_s, config.keep_mb, config.keep_s)
-        self.writer = BackgroundWriter(
-            RecordingFolder(self.folder, limits), int(config.queue_mb * 1e6)
-        )
+        self._recording = RecordingFolder(self.folder, limits)
+        self.writer = BackgroundWriter(self._recording, int(config.queue_mb * 1e6))
         self._began_s = time.monotonic()
         self._began_ns = time.time_ns()
         self._known: set[str] = set()
@@ -137,12 +138,15 @@ class RecorderNode(GraphNode):
 
     def _writer_callback(self, channel: Channel) -> Callable[[bytes, Any], None]:
         queue_message = self.writer.queue_message
+        origin = origin_topic(channel.topic, channel.type_name)
 
         def on_message(data: bytes, info: Any) -> None:
             # Ordered by the time of publication, not of arrival. A latched message is older than
             # the recording: it comes first.
             sent_ns = info['source_timestamp'] or time.time_ns()
             stamp_ns = max(sent_ns, self._began_ns)
+            if origin is not None:
+                self.call_guarded(channel.topic, self._note_origin, channel.topic, origin, data)
             queue_message(
                 QueuedMessage(
                     channel, data, stamp_ns, sent_ns, info['publication_sequence_number'] or 0
@@ -150,6 +154,10 @@ class RecorderNode(GraphNode):
             )
 
         return on_message
+
+    def _note_origin(self, name: str, topic: Topic, data: bytes) -> None:
+        """Keep in metadata.yaml what learner and eyes started from: a split file may lack it."""
+        self._recording.custom_data[name] = origin_text(topic, data)
 
 
 def main(args: list[str] | None = None) -> None:

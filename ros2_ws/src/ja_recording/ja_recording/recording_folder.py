@@ -67,7 +67,7 @@ class RecordingFolder:
 
     What `flush` has written survives a crash of this process. `close` adds the indexes, and the
     metadata.yaml of rosbag2; a file without them can be read up to its last whole message.
-    Raises OSError when the disk is full or fails.
+    `custom_data`: further texts for metadata.yaml. Raises OSError when the disk is full or fails.
     """
 
     def __init__(self, folder: Path, limits: Limits) -> None:
@@ -75,6 +75,7 @@ class RecordingFolder:
         self._limits = limits
         self._files: list[_OpenFile] = []
         self._channels: dict[str, Channel] = {}
+        self.custom_data: dict[str, str] = {}
         self._number = 0
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.glob('*.mcap')):
@@ -185,7 +186,7 @@ class RecordingFolder:
                 'compression_mode': '',
                 'relative_file_paths': [file.path.name for file in files],
                 'files': [file.metadata_entry() for file in files],
-                'custom_data': None,
+                'custom_data': dict(self.custom_data) or None,
                 'ros_distro': 'jazzy',
             }
         }

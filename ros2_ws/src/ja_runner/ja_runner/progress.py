@@ -13,12 +13,14 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 from ja_common.core.learning_curve import LearningCurve
 from ja_common.graph_node import GraphNode
 from ja_common.status_values import status_values
 from ja_common.time_codec import to_ns
-from ja_common.topics import DIAGNOSTICS, EVERY_SCORE, FIXATION, GATE_STATUS
+from ja_common.topics import DIAGNOSTICS, EVERY_SCORE, FIXATION, GATE_STATUS, TRACK, WEIGHT_FILES
+from ja_common.weight_files_codec import decode_weight_files
 
 WINDOW_TRIALS = 100
 _SCREEN_EVERY_S = 0.25
@@ -35,6 +37,8 @@ class ProgressNode(GraphNode):
         self.warnings: dict[str, str] = {}
         self.images = 0
         self.objects = 1
+        self.track = ''
+        self.weight_files: Mapping[str, str] = {}
         self.began_s = math.nan
         self._image_times_s: deque[float] = deque(maxlen=200)
         self._newest_ns = -1
@@ -42,6 +46,8 @@ class ProgressNode(GraphNode):
         self.subscribe(FIXATION, self._on_image)
         self.subscribe(EVERY_SCORE, self._on_score)
         self.subscribe(DIAGNOSTICS, self._on_diagnostics)
+        self.subscribe(TRACK, self._on_track)
+        self.subscribe(WEIGHT_FILES, self._on_weight_files)
 
     @property
     def elapsed_s(self) -> float:
@@ -83,11 +89,18 @@ class ProgressNode(GraphNode):
             else:
                 self.warnings[status.name] = status.message
 
+    def _on_track(self, message: String) -> None:
+        self.track = message.data
+
+    def _on_weight_files(self, message: DiagnosticStatus) -> None:
+        self.weight_files = decode_weight_files(message)
+
     def facts(self) -> dict[str, str]:
         """Return what the display shows, in this order."""
         facts = {
             'trials': str(len(self.curve.records) or self.gate.get('trials', '0')),
             'stage': self.curve.stage or '-',
+            'track': self.track or '-',
             'success rate, recent': str(self.curve.rate(slice(-WINDOW_TRIALS, None))),
             'phase': self.gate.get('phase', 'waiting for the first image'),
             'source': self.gate.get('source', '-'),

@@ -21,6 +21,7 @@ from ja_common.camera_info_codec import encode_camera_info
 from ja_common.core.config import ConfigError, Configuration, parameter
 from ja_common.core.health import Level
 from ja_common.core.stamps import NS_PER_S
+from ja_common.depth_encoder import DEPTH_ENCODINGS, encode_depth
 from ja_common.graph_node import GraphNode
 from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
@@ -29,13 +30,18 @@ from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import (
     CAMERA_INFO,
     CLOCK,
+    DEPTH,
     IMAGE,
     JOINT_COMMANDS,
     JOINT_STATES,
+    RIGHT_CAMERA_INFO,
+    RIGHT_IMAGE,
     SIM_TRUTH,
+    Topic,
 )
+from ja_sim.core.camera import Observation
 from ja_sim.core.pace import Pace
-from ja_sim.core.scene import load_scene
+from ja_sim.core.scene import Scene, load_scene
 from ja_sim.core.world import JointAttentionWorld
 from ja_sim.truth_codec import encode_truth
 
@@ -67,6 +73,20 @@ class SimConfig(Configuration):
         'in lockstep: draw the next picture while the robot processes the last: more images a '
         'second, and a command moves the head one picture later, as with a slower camera',
     )
+    depth: str = parameter(
+        'scene',
+        'depth pictures: as in the scene, none, with the errors of a real sensor, or exact',
+        choices=('scene', 'none', 'sensor', 'exact'),
+    )
+    depth_encoding: str = parameter(
+        '16UC1',
+        'depth pictures in whole millimetres (16UC1) or in metres (32FC1), as in REP-118',
+        choices=DEPTH_ENCODINGS,
+    )
+    second_camera: str = parameter(
+        'scene', 'a second camera to the right: as in the scene, on, or off',
+        choices=('scene', 'on', 'off'),
+    )  # fmt: skip
     resend_after_s: float = parameter(
         0.5, 'in lockstep or a pause: time after which the last image is sent again',
         low=0.05, high=60.0,
@@ -96,6 +116,7 @@ class _Round:
     clock: Clock
     truth: PointCloud2
     joint_states: list[JointState]
+    senses: list[tuple[Topic, Image | CameraInfo]]
     camera_info: CameraInfo
     image: Image
 
@@ -118,6 +139,10 @@ class SimNode(GraphNode):
         self._truth = self.create_topic_publisher(SIM_TRUTH)
         self._joint_states = self.create_topic_publisher(JOINT_STATES)
         self._camera_info = self.create_topic_publisher(CAMERA_INFO)
+        self._senses = {
+            topic: self.create_topic_publisher(topic)
+            for topic in (DEPTH, RIGHT_CAMERA_INFO, RIGHT_IMAGE)
+        }
         self._image = self.create_topic_publisher(IMAGE)
         self.advertise_service(Trigger, 'sim/reset', self._on_reset)
         self.advertise_service(SetBool, 'sim/pause', self._on_pause)
@@ -224,9 +249,29 @@ class SimNode(GraphNode):
                 self._header(observation.stamp_ns, BASE_FRAME), self._world.truth_at_exposure()
             ),
             joint_states,
+            self._encode_senses(observation, header),
             encode_camera_info(header, lens.width, lens.height, lens.fx, lens.fy),
             encode_image(observation.image, header.stamp, CAMERA_FRAME),
         )
+
+    def _encode_senses(
+        self, observation: Observation, header: Header
+    ) -> list[tuple[Topic, Image | CameraInfo]]:
+        """Return the messages of the senses that the scene has switched on."""
+        messages: list[tuple[Topic, Image | CameraInfo]] = []
+        stamp = header.stamp
+        if observation.depth is not None:
+            encoding = self._config.depth_encoding
+            depth = encode_depth(observation.depth, encoding, stamp, CAMERA_FRAME)
+            messages.append((DEPTH, depth))
+        if observation.right is not None:
+            lens, baseline_m = observation.intrinsics, self._world.scene.senses.baseline_m
+            info = encode_camera_info(
+                header, lens.width, lens.height, lens.fx, lens.fy, baseline_m
+            )
+            messages.append((RIGHT_CAMERA_INFO, info))
+            messages.append((RIGHT_IMAGE, encode_image(observation.right, stamp, CAMERA_FRAME)))
+        return messages
 
     def _publish(self) -> None:
         self._published_s = time.monotonic()
@@ -234,6 +279,9 @@ class SimNode(GraphNode):
         self._truth.publish(self._round.truth)
         for message in self._round.joint_states:
             self._joint_states.publish(message)
+        # What belongs to an image comes before it: a subscriber to both need not wait.
+        for topic, message in self._round.senses:
+            self._senses[topic].publish(message)
         self._camera_info.publish(self._round.camera_info)
         self._image.publish(self._round.image)
 
@@ -315,12 +363,21 @@ class SimNode(GraphNode):
         self._restart()
 
     def _make_world(self, objects: int) -> JointAttentionWorld:
-        scene = load_scene(self._config.scene)
+        scene = self._with_senses(load_scene(self._config.scene))
         if objects:
             scene = replace(scene, objects=replace(scene.objects, count=objects))
         self.health.values['objects'] = str(scene.objects.count)
         size = (self._config.image_width, self._config.image_height)
         return JointAttentionWorld(scene, self._config.seed, image_size=size)
+
+    def _with_senses(self, scene: Scene) -> Scene:
+        """Return the scene with the senses that the parameters switch on or off."""
+        senses, config = scene.senses, self._config
+        if config.depth != 'scene':
+            senses = replace(senses, depth=config.depth)
+        if config.second_camera != 'scene':
+            senses = replace(senses, second_camera=config.second_camera == 'on')
+        return replace(scene, senses=senses)
 
 
 def main(args: list[str] | None = None) -> None:

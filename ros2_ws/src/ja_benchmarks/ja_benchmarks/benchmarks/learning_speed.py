@@ -25,7 +25,7 @@ from ja_learning.core.gaze_line import GazeLineLearner
 from ja_learning.core.learner import Predictor
 from ja_learning.core.learner_registry import make_learner
 from ja_learning.core.network import ThreeLayerNetwork
-from ja_learning.core.trial import Trial
+from ja_learning.core.trial import Look, Trial
 
 SEEDS = range(10)
 TRIALS = 2000
@@ -130,8 +130,9 @@ def success(learner: Predictor, looks: Looks, objects: int, seed: int) -> float:
         looks.faces, looks.faces_at, looks.postures, looks.directions, strict=True
     ):
         for _ in range(ARRANGEMENTS):
-            places = _places(rng, attended - posture, objects)
-            delta = learner.propose(face, face_at, posture, posture + places)
+            places = draw_places(rng, attended - posture, objects)
+            delta = learner.propose(Look(face, face_at), posture, posture + places)
+            assert delta is not None  # every look shows pixels
             right.append(np.argmin(np.hypot(*(places - delta).T)) == 0)
     return float(np.mean(right))
 
@@ -143,7 +144,7 @@ def _trial(rng: np.random.Generator, looks: Looks, trial: int, condition: Learni
     attended = looks.directions[look] - posture
     if rng.random() >= condition.reliability:
         attended = _place(rng, [])
-    places = posture + _places(rng, attended, condition.objects)
+    places = posture + draw_places(rng, attended, condition.objects)
     fixated = places[rng.integers(condition.objects)]
     shown = places[:1] if condition.labelled else rng.permutation(places)
     return Trial(
@@ -151,7 +152,7 @@ def _trial(rng: np.random.Generator, looks: Looks, trial: int, condition: Learni
     )
 
 
-def _places(
+def draw_places(
     rng: np.random.Generator, attended: NDArray[np.float64], objects: int
 ) -> NDArray[np.float64]:
     """Draw displacements (objects, 2) [rad] from the look, that of the attended object first."""

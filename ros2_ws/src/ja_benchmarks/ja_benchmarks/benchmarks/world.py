@@ -22,17 +22,23 @@ from ja_perception.core.face_crop import crop_face
 from ja_perception.core.haar import read_cascade
 from ja_sim.core.caregiver import identities
 from ja_sim.core.scene import Scene, load_scene
-from ja_sim.core.specs import HEAD_PRESETS
+from ja_sim.core.specs import HEAD_PRESETS, SensesSpec
 from ja_sim.core.world import JointAttentionWorld
 
 SIZES = ((160, 120), (320, 240), (640, 480))
 TURNS_DEG = (0, 20, 40, 60)
+SENSES = {
+    'none': SensesSpec(),
+    'exact depth': SensesSpec(depth='exact'),
+    'depth of a sensor': SensesSpec(depth='sensor'),
+    'second camera': SensesSpec(second_camera=True),
+}
 PENALTIES = (0.1, 0.3, 1.0, 3.0, 10.0)
 
 
 def run() -> dict[str, Row]:
     """Measure all figures of the world."""
-    return speed() | detection() | head_pose() | ceiling()
+    return speed() | senses() | detection() | head_pose() | ceiling()
 
 
 def speed(pictures: int = 200) -> dict[str, Row]:
@@ -48,6 +54,30 @@ def speed(pictures: int = 200) -> dict[str, Row]:
         times = _times(partial(world.step, 0.1), pictures)
         rows[f'step of 0.1 s, {preset}'] = mean_row(1e3 * times, 'ms')
         world.close()
+    return rows
+
+
+def senses(pictures: int = 200) -> dict[str, Row]:
+    """Measure the processor time that depth and a second camera add to a picture."""
+    rows = {}
+    for size in SIZES[1:]:
+        worlds = {
+            name: JointAttentionWorld(_with_senses(spec), seed=0, image_size=size)
+            for name, spec in SENSES.items()
+        }
+        times: dict[str, list[float]] = {name: [] for name in worlds}
+        for _ in range(pictures + 1):
+            for name, world in worlds.items():
+                world.step(0.02)
+                began_s = time.process_time()
+                world.observe()
+                times[name].append(time.process_time() - began_s)
+        for name, world in worlds.items():
+            world.close()
+            if name != 'none':
+                # The first picture opens the renderer.
+                added = np.subtract(times[name], times['none'])[1:]
+                rows[f'{name}, added at {size[0]}x{size[1]}'] = mean_row(1e3 * added, 'ms')
     return rows
 
 
@@ -221,6 +251,10 @@ def _of_person(name: str) -> Scene:
     return dataclasses.replace(
         scene, caregiver=dataclasses.replace(scene.caregiver, identity=name)
     )
+
+
+def _with_senses(spec: SensesSpec) -> Scene:
+    return dataclasses.replace(load_scene('default'), senses=spec)
 
 
 def _on_head(preset: str) -> Scene:

@@ -13,10 +13,12 @@ from ja_bringup.commands.options import (
     OnDeathChoice,
     OneProcess,
     Record,
+    Senses,
     Swap,
     View,
 )
 from ja_runner.graph import RECORDER, replace_nodes, sim_graph, with_arguments
+from ja_runner.senses import parse_senses, with_senses
 from ja_runner.supervisor import Supervision
 
 
@@ -78,6 +80,7 @@ def demo(
         Optional[Path],
         typer.Option(help='Resume the run in this folder, with all that it learned.'),
     ] = None,
+    senses: Senses = '',
     swap: Swap = None,
     record: Record = False,
     one_process: OneProcess = False,
@@ -95,7 +98,8 @@ def demo(
 
     arguments = context.obj or []
     sim = {'scene': scene or SCENE[learner.value], 'draw_ahead': draw_ahead}
-    graph = replace_nodes(sim_graph(seed, sim, learner.value), swap or ())
+    graph = with_senses(sim_graph(seed, sim, learner.value), parse_senses(senses))
+    graph = replace_nodes(graph, swap or ())
     stages = standard_course(trials or PRACTICE_TRIALS[learner.value], time_s, exam_trials)
     graph = with_arguments([*[RECORDER] * record, *graph], arguments)
     supervision = Supervision(on_death.value, hung_after_s)

@@ -24,6 +24,13 @@ HungAfter = Annotated[
 ]
 OneProcess = Annotated[bool, typer.Option('--one-process', help='All nodes in one process.')]
 Record = Annotated[bool, typer.Option('--record', help='Record all topics into runs/.')]
+Senses = Annotated[
+    str,
+    typer.Option(
+        help='What it senses beside the picture, with commas: eyes (her head pose and eyes from '
+        'landmarks), depth (a depth camera) or second-camera.'
+    ),
+]
 View = Annotated[bool, typer.Option(help='Serve the live page, and print its address.')]
 Swap = Annotated[
     Optional[list[str]],

@@ -6,6 +6,8 @@ from typing import Annotated, Optional
 
 import typer
 
+from ja_recording.core.default_exclude import DEFAULT_EXCLUDE
+
 _RECORDING = 'A .mcap or .db3 file, compressed or not, or the folder of one recording.'
 
 
@@ -24,7 +26,7 @@ def record(
     ] = None,
     exclude: Annotated[
         str, typer.Option(help='Regular expression: topics that it matches are left out.')
-    ] = 'image_annotated',
+    ] = DEFAULT_EXCLUDE,
     time_s: Annotated[
         float, typer.Option('--time', min=0.0, help='End after so many seconds; 0: no end.')
     ] = 0.0,

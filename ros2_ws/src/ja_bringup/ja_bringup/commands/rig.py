@@ -11,10 +11,12 @@ from ja_bringup.commands.options import (
     OnDeathChoice,
     OneProcess,
     Record,
+    Senses,
     Swap,
     View,
 )
 from ja_runner.graph import RECORDER, replace_nodes, rig_graph, with_arguments
+from ja_runner.senses import parse_senses, with_senses
 from ja_runner.supervisor import Supervision
 
 
@@ -35,6 +37,7 @@ def rig(
     time_s: Annotated[
         float, typer.Option('--time', min=0.0, help='End after so many seconds.')
     ] = 0.0,
+    senses: Senses = '',
     swap: Swap = None,
     record: Record = False,
     one_process: OneProcess = False,
@@ -47,7 +50,7 @@ def rig(
     from ja_runner.run import run_graph
 
     arguments = context.obj or []
-    graph = replace_nodes(rig_graph(source), swap or ())
+    graph = replace_nodes(with_senses(rig_graph(source), parse_senses(senses)), swap or ())
     code, _ = run_graph(
         with_arguments([*[RECORDER] * record, *graph], arguments),
         new_run_folder('rig'),

@@ -55,6 +55,8 @@ def _draw(canvas: NDArray[np.uint8], detection: Detection, enlarge: int, is_targ
     thickness = 3 if is_target or detection.attended else 1
     cv2.rectangle(canvas, top_left, bottom_right, colour, thickness, cv2.LINE_AA)
     name = ('face' if face else 'object') + f' {detection.track_id}  {detection.score:.2f}'
+    if math.isfinite(detection.range_m):
+        name += f'  {detection.range_m:.2f} m'
     _text(canvas, name, (top_left[0], top_left[1] - 5), colour)
     if not face:
         _feature_bars(canvas, detection, (top_left[0], bottom_right[1] + 3))

@@ -29,6 +29,20 @@ class FaceGaze(NamedTuple):
         """Return which eyes are visible, (2,), her left one first."""
         return np.asarray(np.isfinite(self.eyes).all(axis=1))
 
+    def as_row(self) -> NDArray[np.float64]:
+        """Return all numbers in the order of the fields, (9,)."""
+        head = [*self.head, self.head_deviation_rad]
+        return np.array([*head, *self.eyes.ravel(), self.eye_deviation_rad], float)
+
+    @staticmethod
+    def from_row(row: NDArray[np.floating]) -> 'FaceGaze | None':
+        """Return the reading of a row (9,) of `as_row`; None where its head pose is NaN."""
+        if np.isnan(row[:3]).any():
+            return None
+        values: NDArray[np.float64] = np.array(row, float)
+        eyes = values[4:8].reshape(2, 2)
+        return FaceGaze(values[:3], float(values[3]), eyes, float(values[8]))
+
     def mirrored(self) -> 'FaceGaze':
         """Return what the mirror image of this face would give."""
         sign = np.array([-1.0, 1.0, -1.0])

@@ -1,7 +1,7 @@
 """Items that wait for the posture at their stamp and for the calibration, but not for ever."""
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -41,14 +41,20 @@ class PatientQueue(Generic[Item]):
         self._waiting.append(_Waiting(stamp_ns, item, now_s))
 
     def pop_ready(
-        self, calibrated: bool, now_s: float
+        self,
+        calibrated: bool,
+        now_s: float,
+        must_wait: Callable[[int, float], bool] = lambda stamp_ns, waited_s: False,
     ) -> Iterator[tuple[Item, int, Posture | None]]:
         """Yield the items whose waiting is over: item, stamp, posture (None: it stays unknown).
 
+        `must_wait`: for a stamp [ns] and the time waited [s], whether something else is awaited.
         An item is taken out when it is yielded: if its handling fails, those after it still wait.
         """
         while self._waiting:
             first = self._waiting[0]
+            if must_wait(first.stamp_ns, now_s - first.since_s):
+                break
             impatient = now_s - first.since_s > self._patience_s
             posture = self._postures.at(first.stamp_ns)
             if not impatient and (

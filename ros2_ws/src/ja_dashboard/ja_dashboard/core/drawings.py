@@ -9,19 +9,20 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ja_common.core.detection import Kind
+from ja_common.core.detection import Detection, Kind
 from ja_dashboard.core.view_model import SceneView
 
 _DISTANCE_M = 1.0
-"""A camera measures directions, not distances: detections lie on this arc."""
+"""A camera measures directions: detections of which no range is known lie on this arc."""
 _REACH_M = 1.3
 _BELIEF_M = 1.15
+_GAZE_M = 1.0
 
 _STYLE = """<style>
 .area { fill: #38bdf822; stroke: #38bdf8 } .limit { fill: none; stroke: #64748b }
 .object { fill: #f59e0b } .face { fill: #fde68a; stroke: #b45309 } .belief { fill: #c084fc }
 .truth { fill: none; stroke: #4ade80 } .attended { fill: #4ade8055 } .head { fill: #38bdf8 }
-.command { stroke: #f472b6 } .arc { fill: none; stroke: #334155 }
+.command, .gaze { stroke: #f472b6 } .arc { fill: none; stroke: #334155 }
 svg * { vector-effect: non-scaling-stroke; stroke-width: 1.5 }
 text { fill: #94a3b8; stroke: none; font-family: sans-serif }
 </style>"""
@@ -38,9 +39,13 @@ def from_above(scene: SceneView) -> str:
         sector = f'{_arc(_REACH_M, pan - half, pan + half)} L 0 0 Z'
         parts.append(f'<path class="area" d="{sector}"><title>field of view</title></path>')
     for detection, direction in zip(scene.detections, scene.directions, strict=True):
-        x, y = _from_above(_DISTANCE_M, direction)
+        x, y = _from_above(_shown_distance_m(detection), direction)
         face = detection.kind is Kind.FACE
         name = 'face' if face else f'object {detection.track_id}'
+        if math.isfinite(detection.range_m):
+            name += f', {detection.range_m:.2f} m'
+        if detection.attended and scene.gaze is not None:
+            parts.append(_gaze_from_above(x, y, scene.gaze[0]))
         shape = f'class="{"face" if face else "object"}" r="{0.09 if face else 0.04}"'
         parts.append(f'<circle {shape} cx="{x:.3f}" cy="{y:.3f}"><title>{name}</title></circle>')
     if scene.truth is not None:
@@ -103,6 +108,20 @@ def _true_place(x: float, y: float, radius: float, attended: bool) -> str:
     at = f'cx="{x:.3f}" cy="{y:.3f}" r="{radius}"'
     kind = 'truth attended' if attended else 'truth'
     return f'<circle class="{kind}" {at}><title>{name}</title></circle>'
+
+
+def _shown_distance_m(detection: Detection) -> float:
+    known = math.isfinite(detection.range_m)
+    return min(detection.range_m, _REACH_M) if known else _DISTANCE_M
+
+
+def _gaze_from_above(x: float, y: float, yaw: float) -> str:
+    """Line of the gaze of a face at (x, y): yaw 0 is towards the robot, positive to its left."""
+    distance = max(math.hypot(x, y), 1e-9)
+    towards, sideways = -np.array([x, y]) / distance, np.array([y, -x]) / distance
+    end = np.array([x, y]) + _GAZE_M * (math.cos(yaw) * towards + math.sin(yaw) * sideways)
+    ends = f'x1="{x:.3f}" y1="{y:.3f}" x2="{end[0]:.3f}" y2="{end[1]:.3f}"'
+    return f'<line class="gaze" {ends}><title>where she looks, as read</title></line>'
 
 
 def _from_above(distance_m: float, direction: ArrayLike) -> tuple[float, float]:

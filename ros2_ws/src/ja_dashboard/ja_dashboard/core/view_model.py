@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ja_common.core.detection import Detection
 from ja_common.core.health import Level
 from ja_common.core.learning_curve import LearningCurve
+from ja_common.core.weight_files import weight_files_text
 
 WINDOW_TRIALS = 100
 STOPPED_AFTER_S = 2.0
@@ -97,6 +98,7 @@ class SceneView:
     `half_view` is half the field of view [rad], sideways and upward; `low` and `high` are the
     limits of the joints, `detections` stand at `directions` (n, 2). `belief` (m, 3) holds samples
     of the learner's belief: direction and weight. `truth` is set on request, in simulation.
+    `gaze`: where the attended face looks, yaw and pitch (2,) [rad] as in `FaceGaze`, if read.
     """
 
     half_view: tuple[float, float]
@@ -108,6 +110,7 @@ class SceneView:
     directions: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 2)))
     belief: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3)))
     truth: TruthView | None = None
+    gaze: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -141,6 +144,8 @@ class ViewModel:
         self.curve = LearningCurve()
         self.gate: Mapping[str, str] = {}
         self.fixations: Counter[str] = Counter()
+        self.track = ''
+        self.weight_files: Mapping[str, str] = {}
         self.log: deque[tuple[int, str]] = deque(maxlen=_LOG_LINES)
         self.log_lines = 0
         self._node_health: dict[str, NodeHealth] = {}
@@ -234,6 +239,8 @@ class ViewModel:
             'p(LM)': self.gate.get('p_lm', '-'),
             'trials': self.gate.get('trials', '-'),
             'objects': self._health_value('objects'),
+            'track': _short(self.track),
+            'weight files': weight_files_text(self.weight_files),
         }
         recent = self.curve.rate(slice(-WINDOW_TRIALS, None))
         if recent.trials:

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ja_common.core.detection import Detection, caregiver_face, most_salient, objects
+from ja_common.core.detection import Detection, caregiver_face, most_salient
+from ja_common.core.face_gaze import FaceGaze
 from ja_common.core.posture import Posture
 from ja_control.core.attention_cycle import AttentionCycle, CycleInput, Decision
 from ja_control.core.gating import Gating
@@ -17,7 +18,7 @@ from ja_experiments.config import ExperimentConfig
 from ja_learning.core.evaluator import EvaluatorConfig, InternalEvaluator
 from ja_learning.core.learner import TrainablePredictor
 from ja_learning.core.look_around import LookAroundConfig
-from ja_learning.core.trial import Trial
+from ja_learning.core.trial import Look, Trial
 from ja_learning.core.trial_pipeline import Proposal, TrialPipeline
 
 
@@ -30,14 +31,16 @@ class FixedTurn:
         self._turn = np.array(turn, float)
 
     def propose(
-        self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike
+        self,
+        look: Look,
+        posture: ArrayLike,
+        candidates: ArrayLike,
+        ranges: ArrayLike | None = None,
     ) -> NDArray[np.float64]:
         return self._turn
 
-    def belief(
-        self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
-    ) -> NDArray[np.float64]:
-        return np.tile(np.asarray(face_at, float) + self._turn, (count, 1))
+    def belief(self, look: Look, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+        return np.tile(look.face_at + self._turn, (count, 1))
 
     def update(self, trial: Trial) -> None:
         pass
@@ -66,16 +69,17 @@ class OnlineLearner:
         self._taught = taught
 
     def step(
-        self, detections: list[Detection], face: NDArray[np.uint8] | None, posture: Posture
+        self,
+        detections: list[Detection],
+        face: NDArray[np.uint8] | None,
+        posture: Posture,
+        gaze: FaceGaze | None = None,
     ) -> tuple[Proposal, NDArray[np.float64] | None]:
         """Process one image: return the proposal, and the direction (2,) [rad] fixated, or None.
 
-        `face`: the picture of the attended face, uint8 (30, 25), or None.
+        `face`: the picture of the attended face, uint8 (30, 25), or None; `gaze`: as in `Look`.
         """
-        rays = [seen.ray for seen in objects(detections)]
-        seen = caregiver_face(detections)
-        attended = None if face is None or seen is None else (face, seen.ray)
-        proposal = self._pipeline.process_image(posture, np.reshape(rays, (-1, 2)), attended)
+        proposal = self._pipeline.process_image(posture, detections, face, gaze)
         fixation = self._evaluator.find_fixation(detections, posture)
         if fixation is not None:
             self._pipeline.process_fixation(posture, fixation)
@@ -120,13 +124,17 @@ class Robot:
         )
 
     def step(
-        self, detections: list[Detection], face: NDArray[np.uint8] | None, posture: Posture
+        self,
+        detections: list[Detection],
+        face: NDArray[np.uint8] | None,
+        posture: Posture,
+        gaze: FaceGaze | None = None,
     ) -> Step:
         """Process one image: its detections, and the picture of the attended `face`, or None.
 
-        `face`: uint8 (30, 25).
+        `face`: uint8 (30, 25); `gaze`: as in `Look`.
         """
-        proposal, fixation = self._online_learner.step(detections, face, posture)
+        proposal, fixation = self._online_learner.step(detections, face, posture, gaze)
         percept = CycleInput(
             posture,
             face_delta=self._feedback(caregiver_face(detections)),

@@ -16,25 +16,27 @@ import shutil
 import time
 import zipfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields, replace
 from importlib import metadata, resources
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ja_common.core.cache import cache_folder
 from ja_common.core.config import ConfigError
-from ja_common.core.detection import caregiver_face
+from ja_common.core.detection import caregiver_face, objects
 from ja_common.core.files import why_not_written
-from ja_common.core.geometry import directions_of_rays
+from ja_common.core.geometry import angle_between, directions_of_rays
 from ja_common.core.safe_files import load_json, read_bytes
 from ja_control.core.attention_cycle import Phase
 from ja_experiments.agents.robot import FixedTurn, Robot
 from ja_experiments.config import ExperimentConfig
-from ja_experiments.datasets.rendered import DWELL_S, RenderedTask
+from ja_experiments.datasets.rendered import DWELL_S, RenderedStep, RenderedTask
+from ja_learning.core.trial import SAME_OBJECT_RAD
+from ja_perception.core.gaze_reader import GazeReader
 from ja_sim.core.scene import load_scene
 from ja_sim.core.world import JointAttentionWorld
 
@@ -48,6 +50,22 @@ _ASIDE_RAD = (0.35, 0.0)
 _MADE_BY = ('ja_common', 'ja_perception', 'ja_control', 'ja_sim')
 _LIBRARIES = ('mujoco', 'numpy')
 _FILES = ('.py', '.npz', '.png', '.xml', '.yaml', '.onnx')
+_WEIGHTS, _FACE_DETECTOR = '.onnx', 'blazeface_short_range.onnx'
+"""Of the weights, looks without senses depend on the face detector's, and open no other."""
+
+
+def _unknown() -> NDArray[np.float64]:
+    return np.empty(0)
+
+
+_SENSES: dict[str, tuple[int, ...]] = {
+    'gazes': (9,),
+    'face_ranges': (2,),
+    'object_ranges': (2,),
+    'face_distances': (),
+    'object_distances': (),
+}
+"""Columns of what the looks of a robot with more senses hold beside the pictures."""
 
 
 @dataclass(frozen=True)
@@ -57,22 +75,65 @@ class Looks:
     `faces`: uint8 (n, 30, 25), seen in the directions `faces_at`, (n, 2) [rad]. `postures`: (n, 2)
     [rad], of the head at the look. `directions`: (n, 2) [rad], of the attended object. The paper's
     motor command is the difference `directions - postures`.
+
+    What a robot with more senses measures is NaN where it was not measured, and everywhere where
+    the looks were made without these senses. `gazes`: (n, 9), of landmarks, rows of
+    `FaceGaze.as_row`. `face_ranges`, `object_ranges`: (n, 2) [m], distances to the surface of her
+    face and of the attended object, as the detections have them, and their standard deviations.
+    The robot looked at the object for its range. `face_distances`, `object_distances`: (n,) [m],
+    the true distances to their centres, for the experiment that places things there; the learner
+    never receives them. All distances are from the robot's camera.
     """
 
     faces: NDArray[np.uint8]
     faces_at: NDArray[np.float64]
     postures: NDArray[np.float64]
     directions: NDArray[np.float64]
+    gazes: NDArray[np.float64] = field(default_factory=_unknown)
+    face_ranges: NDArray[np.float64] = field(default_factory=_unknown)
+    object_ranges: NDArray[np.float64] = field(default_factory=_unknown)
+    face_distances: NDArray[np.float64] = field(default_factory=_unknown)
+    object_distances: NDArray[np.float64] = field(default_factory=_unknown)
+
+    def __post_init__(self) -> None:
+        for name, columns in _SENSES.items():
+            if not getattr(self, name).size:
+                object.__setattr__(self, name, np.full((len(self), *columns), np.nan))
 
     def __len__(self) -> int:
         return len(self.faces)
 
     def __getitem__(self, chosen: slice) -> Looks:
-        return Looks(*(getattr(self, field.name)[chosen] for field in fields(self)))
+        return Looks(*(getattr(self, each.name)[chosen] for each in fields(self)))
 
 
-Render = Callable[[str, int, int, Callable[[int], None]], Looks]
-"""Makes looks of (scene, seed, count, progress)."""
+@dataclass(frozen=True)
+class LooksOrder:
+    """Which looks: at the caregiver of a scene and seed, so many, at (width, height) [px].
+
+    `senses`: the robot has a reader of landmarks, and a depth sensor, if the scene does not name
+    another.
+    """
+
+    scene: str
+    seed: int
+    count: int
+    senses: bool = False
+    image_size: tuple[int, int] = IMAGE_SIZE
+
+    @property
+    def name(self) -> str:
+        """Return the name of their folder in the cache."""
+        name = f'looks-{Path(self.scene).stem}-{self.seed}-{self.count}'
+        if self.senses:
+            name += '-senses'
+        if self.image_size != IMAGE_SIZE:
+            name += '-{}x{}'.format(*self.image_size)
+        return name
+
+
+Render = Callable[[LooksOrder, Callable[[int], None]], Looks]
+"""Makes the looks of an order, and reports the number finished since its last call."""
 
 
 def load_looks(
@@ -83,16 +144,20 @@ def load_looks(
     report: Callable[[str], None] = print,
     progress: Callable[[int], None] = lambda more: None,
     render: Render | None = None,
+    senses: bool = False,
+    image_size: tuple[int, int] = IMAGE_SIZE,
 ) -> Looks:
     """Return looks at the caregiver of a scene and seed, from `folder` or newly rendered.
 
     Cached looks are used only if their checksum is right and if what made them is unchanged:
-    scene, seed, sources of the sim and of the perception, libraries. `report` receives one line
+    the arguments, sources of the sim and of the perception, libraries. `report` receives one line
     when looks are rendered, `progress` the number of looks that are finished since its last call.
-    `render`: makes the looks of (scene, seed, count, progress); None: the rendered world.
+    `render`: makes the looks; None: the rendered world. `senses`, `image_size`: as in
+    `LooksOrder`.
     """
-    kept = (folder or cache_folder()) / f'looks-{Path(scene).stem}-{seed}-{count}'
-    maker = _maker(scene, seed, count)
+    order = LooksOrder(scene, seed, count, senses, image_size)
+    kept = (folder or cache_folder()) / order.name
+    maker = _maker(order)
     try:
         looks = _read(kept, maker)
     except _NotUsableError as why:
@@ -100,7 +165,7 @@ def load_looks(
     else:
         progress(count)
         return looks
-    looks = (render or _render)(scene, seed, count, progress)
+    looks = (render or _render)(order, progress)
     try:
         _write(kept, maker, looks)
     except OSError as error:
@@ -128,7 +193,7 @@ def _read(kept: Path, maker: dict[str, Any]) -> Looks:
         raise _NotUsableError(f'those in {kept} were made with other {", ".join(changed)}')
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            return Looks(**{field.name: arrays[field.name] for field in fields(Looks)})
+            return Looks(**{each.name: arrays[each.name] for each in fields(Looks)})
     except (KeyError, ValueError, OSError, zipfile.BadZipFile) as error:
         raise _NotUsableError(f'those in {kept} cannot be read: {error}') from None
 
@@ -152,26 +217,29 @@ def _write(kept: Path, maker: dict[str, Any], looks: Looks) -> None:
         raise
 
 
-def _maker(scene: str, seed: int, count: int) -> dict[str, Any]:
+def _maker(order: LooksOrder) -> dict[str, Any]:
     """Return everything that the looks depend on."""
     return {
-        'scene': repr(load_scene(scene)),
-        'seed': seed,
-        'count': count,
-        'sources': _sha256(_sources()),
+        'scene': repr(load_scene(order.scene)),
+        'seed': order.seed,
+        'count': order.count,
+        'senses': order.senses,
+        'image_size': list(order.image_size),
+        'sources': _sha256(_sources(order.senses)),
         **{library: metadata.version(library) for library in _LIBRARIES},
         # Not by metadata: OpenCV comes in packages of several names.
         'opencv': cv2.__version__,
     }
 
 
-def _sources() -> Iterator[bytes]:
+def _sources(senses: bool) -> Iterator[bytes]:
     """Yield the core modules and data that make a look, and the modules of its procedure."""
     for package in _MADE_BY:
         root = Path(str(resources.files(package)))
         # The nodes take no part in rendering.
         for path in sorted(p for p in root.rglob('*') if p.suffix in _FILES):
-            if path.parent != root:
+            unused = path.suffix == _WEIGHTS and path.name != _FACE_DETECTOR and not senses
+            if path.parent != root and not unused:
                 yield path.relative_to(root).as_posix().encode()
                 yield path.read_bytes()
     root = Path(str(resources.files('ja_experiments')))
@@ -186,33 +254,88 @@ def _sha256(chunks: Iterator[bytes] | list[bytes]) -> str:
     return digest.hexdigest()
 
 
-def _render(scene: str, seed: int, count: int, progress: Callable[[int], None]) -> Looks:
-    """Render looks: look at the caregiver, wait, look aside, and repeat."""
+class _Aside(FixedTurn):
+    """Turns aside from her: always alike, or to where the experiment points."""
+
+    def point(self, turn: NDArray[np.float64]) -> None:
+        """Turn by this, (2,) [rad], from the next image on."""
+        self._turn = turn
+
+
+def _render(order: LooksOrder, progress: Callable[[int], None]) -> Looks:
+    """Render looks: look at the caregiver, wait, look aside, and repeat.
+
+    A robot with a sense of depth looks at the attended object instead of aside, so that its range
+    is measured.
+    """
     config = ExperimentConfig().with_settings(
         {'dwell_s': DWELL_S, 'max_shifts': 1, 'gating': 'constant', 'p_lm_max': 1.0}
     )
-    world = JointAttentionWorld(load_scene(scene), seed, IMAGE_SIZE)
-    task = RenderedTask(world, Robot(config, FixedTurn(_ASIDE_RAD), np.random.default_rng(seed)))
-    faces: list[NDArray] = []
-    faces_at: list[NDArray] = []
-    postures: list[NDArray] = []
-    directions: list[NDArray] = []
+    scene = load_scene(order.scene)
+    if order.senses and scene.senses.depth == 'none':
+        scene = replace(scene, senses=replace(scene.senses, depth='sensor'))
+    world = JointAttentionWorld(scene, order.seed, order.image_size)
+    aside = _Aside(_ASIDE_RAD)
+    robot = Robot(config, aside, np.random.default_rng(order.seed))
+    task = RenderedTask(world, robot, GazeReader() if order.senses else None)
+    looks: list[dict[str, ArrayLike]] = []
     trial = 0
     try:
-        while len(faces) < count:
+        # The range of the last object is measured after its look.
+        while len(looks) < order.count or order.senses:
+            if order.senses:
+                truth = world.truth()
+                aside.point(truth.directions[truth.attended] - truth.face_direction)
             sight = task.advance()
+            if sight.truth.trial == trial and looks:
+                looks[-1]['object_ranges'] = _attended_range(sight, looks[-1]['object_ranges'])
             watched = sight.step.decision.phase is Phase.SHIFT
-            face, picture = caregiver_face(sight.percept.detections), sight.percept.face_image
             # If she did not notice that the robot looked away, it is the same look.
-            if not watched or face is None or picture is None:
+            if not watched or not _shows_face(sight) or sight.truth.trial <= trial:
                 continue
-            if sight.truth.trial > trial:
-                trial = sight.truth.trial
-                faces.append(picture)
-                faces_at.append(directions_of_rays(sight.posture.position, face.ray))
-                postures.append(sight.posture.position)
-                directions.append(sight.truth.directions[sight.truth.attended])
-                progress(1)
+            if len(looks) == order.count:
+                break
+            trial = sight.truth.trial
+            looks.append(_look(sight))
+            progress(1)
     finally:
         world.close()
-    return Looks(*map(np.array, (faces, faces_at, postures, directions)))
+    return Looks(**{name: np.array([look[name] for look in looks]) for name in looks[0]})
+
+
+def _shows_face(sight: RenderedStep) -> bool:
+    percept = sight.percept
+    return caregiver_face(percept.detections) is not None and percept.face_image is not None
+
+
+def _look(sight: RenderedStep) -> dict[str, ArrayLike]:
+    """Return one look, by the names of the fields of `Looks`."""
+    truth, percept = sight.truth, sight.percept
+    face = caregiver_face(percept.detections)
+    assert face is not None
+    assert percept.face_image is not None
+    gaze = percept.face_gaze
+    return {
+        'faces': percept.face_image,
+        'faces_at': directions_of_rays(sight.posture.position, face.ray),
+        'postures': sight.posture.position,
+        'directions': truth.directions[truth.attended],
+        'gazes': np.full(9, np.nan) if gaze is None else gaze.as_row(),
+        'face_ranges': face.range,
+        'object_ranges': np.full(2, np.nan),
+        'face_distances': float(np.linalg.norm(truth.face_position)),
+        'object_distances': float(np.linalg.norm(truth.positions[truth.attended])),
+    }
+
+
+def _attended_range(sight: RenderedStep, known: ArrayLike) -> ArrayLike:
+    """Return the range (2,) [m] of the attended object in this image; if it has none, `known`."""
+    attended = sight.truth.directions[sight.truth.attended]
+    here = sight.posture.position
+    near = [
+        seen
+        for seen in objects(sight.percept.detections)
+        if angle_between(directions_of_rays(here, seen.ray), attended) < SAME_OBJECT_RAD
+    ]
+    ranges = [seen.range for seen in near if np.isfinite(seen.range_m)]
+    return ranges[0] if ranges else known

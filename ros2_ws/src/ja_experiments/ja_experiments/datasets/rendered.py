@@ -11,7 +11,12 @@ from ja_common.core.camera_model import CameraModel
 from ja_common.core.posture import Posture
 from ja_experiments.agents.robot import Robot, Step
 from ja_perception.core.blazeface import BlazeFace
+from ja_perception.core.depth_ranges import DepthPicture
 from ja_perception.core.detector import Percept, SalientFeatureDetector
+from ja_perception.core.gaze_reader import GazeReader
+from ja_perception.core.ranging import RangeSensor
+from ja_perception.core.stereo_ranges import SecondView
+from ja_sim.core.camera import Observation
 from ja_sim.core.world import JointAttentionWorld, WorldTruth
 
 IMAGE_PERIOD_S = 0.1
@@ -32,11 +37,17 @@ class RenderedStep:
 
 
 class RenderedTask:
-    """A world, a detector and a robot in a loop; one `advance` processes one image."""
+    """A world, a detector and a robot in a loop; one `advance` processes one image.
 
-    def __init__(self, world: JointAttentionWorld, robot: Robot) -> None:
+    The robot has the senses of the world's scene: detections have ranges by the depth picture, or
+    else by the second camera. With a `gaze_reader`, the robot reads landmarks too.
+    """
+
+    def __init__(
+        self, world: JointAttentionWorld, robot: Robot, gaze_reader: GazeReader | None = None
+    ) -> None:
         self._world, self._robot = world, robot
-        self._detector = SalientFeatureDetector(BlazeFace())
+        self._detector = SalientFeatureDetector(BlazeFace(), gaze_reader=gaze_reader)
 
     def advance(self) -> RenderedStep:
         """Step the world by one image period, take a picture, and command the head."""
@@ -46,7 +57,16 @@ class RenderedTask:
         camera = CameraModel(
             seen.intrinsics.width, seen.intrinsics.height, seen.fx, seen.fy, seen.cx, seen.cy
         )
-        percept = self._detector.detect(seen.image, seen.stamp_ns, camera, posture)
-        step = self._robot.step(percept.detections, percept.face_image, posture)
+        percept = self._detector.detect(
+            seen.image, seen.stamp_ns, camera, posture, self._range_sensor(seen)
+        )
+        step = self._robot.step(percept.detections, percept.face_image, posture, percept.face_gaze)
         self._world.command(step.command)
         return RenderedStep(seen.image, camera, percept, posture, step, truth)
+
+    def _range_sensor(self, seen: Observation) -> RangeSensor | None:
+        if seen.depth is not None:
+            return DepthPicture(seen.depth)
+        if seen.right is not None:
+            return SecondView(seen.right, seen.fx * self._world.scene.senses.baseline_m)
+        return None

@@ -20,15 +20,21 @@ from matplotlib.figure import Figure
 
 from ja_common.core.files import write_file
 from ja_common.core.statistics import Estimate, over_seeds
+from ja_common.core.weight_files import note_weight_files, weight_files_text
 from ja_experiments.paper import figures
 from ja_experiments.paper.episodes import choose_examples
 from ja_experiments.paper.experiment import Condition
 from ja_experiments.paper.strips import image_strips
 from ja_experiments.paper.study import FEATURED_OBJECTS, OBJECTS, Study
 from ja_experiments.paper.tables import LOOKS, report_tables
+from ja_learning.core.network_config import NetworkConfig
+from ja_learning.core.track import Track
+from ja_perception.core.blazeface import BlazeFace
 
 _LIBRARIES = ('numpy', 'numba', 'torch', 'mujoco', 'scipy')
 _STRIP_ROWS = 3
+TRACK = str(Track.of_learner(NetworkConfig()))
+"""The paper's network starts from random weights and learns from its own trials."""
 _STYLE = (
     'body{max-width:60rem;margin:2rem auto;padding:0 1rem;font:16px/1.5 system-ui,sans-serif}'
     'img{max-width:100%}table{border-collapse:collapse;margin:1rem 0}'
@@ -94,6 +100,8 @@ def _markdown(study: Study) -> str:
             ],
             learned=len(OBJECTS) * len(plan.seeds) * plan.trials,
             versions=_versions(),
+            track=TRACK,
+            weight_files=weight_files_text(_weight_files(study)) or 'not known',
             tables=report_tables(study),
         )
     )
@@ -110,6 +118,8 @@ def _configuration(study: Study) -> dict[str, Any]:
     plan = study.config.plan
     return {
         'versions': _versions(),
+        'track': TRACK,
+        'weight_files': _weight_files(study),
         'study': {**asdict(study.config), 'plan': {**asdict(plan), 'seeds': list(plan.seeds)}},
         'readings': {
             name: plan.scale_gate(condition.config).settings()
@@ -119,9 +129,23 @@ def _configuration(study: Study) -> dict[str, Any]:
     }
 
 
+def _weight_files(study: Study) -> dict[str, str]:
+    """Return name and SHA-256 of the weight files that made the looks; recorded looks: none known.
+
+    Rendered looks are kept only as long as the perception that made them is the installed one.
+    """
+    if study.config.data:
+        return {}
+    with note_weight_files() as files:
+        BlazeFace()
+    return files
+
+
 def _numbers(study: Study) -> dict[str, Any]:
     return {
         'seconds': study.seconds,
+        'track': TRACK,
+        'weight_files': _weight_files(study),
         'figure 6': {
             f'pairs {name}, {objects} objects': _condition_numbers(condition)
             for name, conditions in study.by_objects.items()

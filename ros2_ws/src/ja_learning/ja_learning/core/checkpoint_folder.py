@@ -12,6 +12,7 @@ from ja_common.core.config import ConfigError, Configuration, parameter
 from ja_common.core.files import why_not_written
 from ja_learning.core.checkpoint import load_checkpoint, save_checkpoint
 from ja_learning.core.learner import Learner
+from ja_learning.core.track import Origin
 
 LAST = 'last.npz'
 """Link to the checkpoint that was written last, for people and tools; nothing here reads it."""
@@ -48,13 +49,17 @@ class CheckpointFolder:
     One process at a time has the folder: two learners would take each other's for their own.
     """
 
-    def __init__(self, folder: Path, config: CheckpointConfig) -> None:
+    def __init__(
+        self, folder: Path, config: CheckpointConfig, origin: Origin | None = None
+    ) -> None:
         """Make the folder if need be.
 
-        Raises ConfigError when another process has it, or when it cannot be made.
+        `origin`: of the learner that is saved and restored; by default the strict one. Raises
+        ConfigError when another process has it, or when it cannot be made.
         """
         self.folder = folder
         self.config = config
+        self._origin = origin or Origin()
         self._saved_trials = 0
         self._lock = _lock(folder)
         for unfinished in folder.glob('.*.npz.*'):  # its writer was killed
@@ -69,7 +74,7 @@ class CheckpointFolder:
         """Write all that was learned, and return the path. Raises as `save_checkpoint`."""
         number = max(map(_number, self._newest_first()), default=0) + 1
         path = self.folder / f'{learner.kind}-{number:06d}.npz'
-        save_checkpoint(path, learner.state(), _description(learner))
+        save_checkpoint(path, learner.state(), _description(learner, self._origin))
         self._saved_trials = learner.trials
         self._link(path)
         if remove_old:
@@ -104,7 +109,7 @@ class CheckpointFolder:
             self.save(learner)
 
     def resume_into(self, learner: Learner, with_trials: bool = False) -> Resumed:
-        """Restore the newest checkpoint that is whole and of this learner's configuration.
+        """Restore the newest whole checkpoint of this learner's configuration and track.
 
         `with_trials`: pass over those of a learner without trials.
 
@@ -114,7 +119,7 @@ class CheckpointFolder:
         refused, passed_over = [], False
         for path in self._newest_first():
             try:
-                restore_checkpoint(path, learner)
+                _restore_checkpoint(path, learner, self._origin)
             except (ValueError, OSError) as error:
                 refused.append(str(error))
                 continue
@@ -169,21 +174,27 @@ def _lock(folder: Path) -> IO[bytes]:
     return lock
 
 
-def restore_checkpoint(path: Path, learner: Learner) -> None:
+def _restore_checkpoint(path: Path, learner: Learner, origin: Origin) -> None:
     """Restore a learner from a checkpoint.
 
     Raises FileNotFoundError, or ValueError with one sentence when the file is damaged, or of
-    another learner or configuration; the learner is then as before.
+    another learner, track or configuration; learner and origin are then as before.
     """
     arrays, theirs = load_checkpoint(path)
-    ours = _description(learner)
+    ours = _description(learner, origin)
     if theirs.get('learner') != ours['learner']:
         raise ValueError(
             f'{path} is of the learner {theirs.get("learner")!r}, not {ours["learner"]!r}'
         )
+    try:
+        origin.check(theirs, learner.config)
+    except ValueError as error:
+        raise ValueError(f'{path}: {error}') from None
     made_with, wanted = theirs.get('configuration'), ours['configuration']
     if not isinstance(made_with, dict):
         raise ValueError(f'{path} does not say how its learner was configured')
+    # A version that did not know a setting yet did what is its default now.
+    made_with = {**asdict(type(learner.config)()), **made_with}
     for name in sorted(made_with.keys() | wanted.keys()):
         if made_with.get(name) != wanted.get(name):
             raise ValueError(
@@ -194,13 +205,15 @@ def restore_checkpoint(path: Path, learner: Learner) -> None:
         learner.restore(arrays)
     except ValueError as error:
         raise ValueError(f'{path}: {error}') from None
+    origin.resume(theirs)
 
 
-def _description(learner: Learner) -> dict[str, Any]:
+def _description(learner: Learner, origin: Origin) -> dict[str, Any]:
     return {
         'learner': learner.kind,
         'configuration': asdict(learner.config),
         'trials': learner.trials,
+        **origin.describe(learner.config),
     }
 
 

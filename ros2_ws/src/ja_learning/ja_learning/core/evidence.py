@@ -15,12 +15,13 @@ own guesses. Only what was seen before the first shift counts (`Trial.seen_befor
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ja_learning.core.checkpoint_arrays import numbers
-from ja_learning.core.trial import FACE_SHAPE
+from ja_learning.core.trial import PICTURE, FaceFormat
 
 _OTHERS = 15
 _FADES_OVER_TRIALS = 100.0
@@ -33,19 +34,20 @@ _SHARE_OF_CHANCE = 0.1
 class Evidence:
     """Faded sum of log ratios [nats], of one belief or of several side by side."""
 
-    def __init__(self, beliefs: int = 1) -> None:
-        """Start with no evidence for any of so many beliefs."""
+    def __init__(self, beliefs: int = 1, faces: FaceFormat = PICTURE) -> None:
+        """Start with no evidence for any of so many beliefs about faces of this format."""
         self.nats: NDArray[np.float64] = np.zeros(beliefs)
-        self._others: list[NDArray[np.uint8]] = []
+        self._faces = faces
+        self._others: list[NDArray[Any]] = []
 
     def weigh_trial(
         self,
-        face: NDArray[np.uint8],
-        log_probability: Callable[[NDArray[np.uint8]], NDArray[np.float64]],
+        face: NDArray[Any],
+        log_probability: Callable[[NDArray[Any]], NDArray[np.float64]],
     ) -> NDArray[np.float64]:
         """Weigh one trial, not learned yet; return its log ratios (beliefs,) [nats].
 
-        `log_probability` returns, for faces (n, 30, 25), how probable each makes what was seen, on
+        `log_probability` returns, for n faces, how probable each makes what was seen, on
         one scale, shape (beliefs, n).
         """
         ratios = np.zeros_like(self.nats)
@@ -59,14 +61,14 @@ class Evidence:
 
     def state(self) -> dict[str, NDArray]:
         """Return everything that weighing has changed, as named arrays."""
-        faces = np.array(self._others, np.uint8).reshape(-1, *FACE_SHAPE)
+        faces = np.array(self._others, self._faces.dtype).reshape(-1, *self._faces.shape)
         return {'evidence.nats': self.nats.copy(), 'evidence.faces': faces}
 
     def restore(self, arrays: dict[str, NDArray]) -> None:
         """Take the state of `state()`; ValueError, and no change, if it misfits."""
         nats = numbers(arrays, 'evidence.nats', self.nats.shape, np.float64)
         known = min(len(np.atleast_1d(arrays.get('evidence.faces', ()))), _OTHERS)
-        faces = numbers(arrays, 'evidence.faces', (known, *FACE_SHAPE), np.uint8)
+        faces = numbers(arrays, 'evidence.faces', (known, *self._faces.shape), self._faces.dtype)
         self.nats, self._others = nats, list(faces)
 
 

@@ -29,14 +29,11 @@ from ja_learning.core.checkpoint_arrays import count, counts, numbers
 from ja_learning.core.evidence import ChangeAlarm, Evidence
 from ja_learning.core.gaze_line_belief import GazeLineBelief
 from ja_learning.core.gaze_line_config import GazeLineConfig
-from ja_learning.core.gaze_line_network import (
-    ANGLE_SCALE_RAD,
-    GazeLineNetwork,
-    give_member,
-    standardised,
-)
+from ja_learning.core.gaze_line_network import GazeLineNetwork, give_member, standardised
+from ja_learning.core.gaze_line_pass import GazeLinePass
+from ja_learning.core.gaze_line_places import seen_places
 from ja_learning.core.replay_memory import ReplayMemory
-from ja_learning.core.trial import FACE_SHAPE, Trial
+from ja_learning.core.trial import FACE_SHAPE, Look, Trial
 
 # Annealing ends after so many trials for every pair of candidates: the more candidates there are,
 # the more trials it takes to tell one from another. A small number is a fast annealing rate.
@@ -80,7 +77,8 @@ class GazeLineLearner:
         self.trials = 0
         self.last_error_rad = float('nan')
         # Otherwise the first proposal would wait for the compiler.
-        self.propose(np.zeros(FACE_SHAPE, np.uint8), np.zeros(2), np.zeros(2), np.empty((0, 2)))
+        nothing = Look(np.zeros(FACE_SHAPE, np.uint8), np.zeros(2))
+        self.propose(nothing, np.zeros(2), np.empty((0, 2)))
 
     @property
     def log_evidence(self) -> float:
@@ -91,7 +89,9 @@ class GazeLineLearner:
         """Return what is believed now, made when first asked for; no later update changes it."""
         if self._belief is None:
             self._belief = GazeLineBelief(
-                self._mean,
+                lambda look: look.face,
+                GazeLinePass(self._mean),
+                self._mean.mixture().as_numpy(),
                 self._log_weights(),
                 self.log_evidence,
                 self.config.top_down,
@@ -100,16 +100,18 @@ class GazeLineLearner:
         return self._belief
 
     def propose(
-        self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike
-    ) -> NDArray[np.float64]:
+        self,
+        look: Look,
+        posture: ArrayLike,
+        candidates: ArrayLike,
+        ranges: ArrayLike | None = None,
+    ) -> NDArray[np.float64] | None:
         """Return a change of posture (2,) [rad] towards the most probable gaze target."""
-        return self.snapshot().propose(face, face_at, posture, candidates)
+        return self.snapshot().propose(look, posture, candidates, ranges)
 
-    def belief(
-        self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
-    ) -> NDArray[np.float64]:
+    def belief(self, look: Look, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
         """Draw directions (count, 2) [rad] from the belief about the gaze target."""
-        return self.snapshot().belief(face, face_at, rng, count)
+        return self.snapshot().belief(look, rng, count)
 
     def update(self, trial: Trial) -> None:
         """Weigh a trial by what is believed, remember it, and replay some of those remembered."""
@@ -117,7 +119,7 @@ class GazeLineLearner:
         if not len(trial.candidates):
             return
         self._belief = None
-        places = ((trial.candidates - trial.face_at) / ANGLE_SCALE_RAD).astype(np.float32)
+        places = seen_places(trial.look, trial.candidates, trial.ranges).astype(np.float32)
         changed = False
         if trial.seen_before_shift:
             changed = self._weigh(trial.face, places[: trial.seen_before_shift])
@@ -201,7 +203,7 @@ class GazeLineLearner:
         )
 
     def _draw_negatives(self, count: int) -> torch.Tensor:
-        """Draw places (members, count, 2) that were seen in any of the trials remembered."""
+        """Draw places (members, count, 8) that were seen in any of the trials remembered."""
         drawn = (count, self.config.members)
         ages = torch.randint(len(self._memory), drawn, generator=self._random)
         which = torch.rand(drawn, generator=self._random)

@@ -9,6 +9,13 @@ from ja_common.core.config import Configuration, parameter
 class GazeLineConfig(Configuration):
     """How the fast learner learns."""
 
+    face_reader: str = parameter(
+        'pixels',
+        'what is read of her face: the 30x25 picture, or head pose and eyes from landmarks '
+        '(face_gaze), which foreign weights have found and of which members, replay and weights '
+        'below do not exist',
+        choices=('pixels', 'landmarks'),
+    )
     members: int = parameter(6, 'networks that learn side by side', low=1, high=64)
     replay_steps: int = parameter(4, 'gradient steps a trial', low=1, high=1000)
     replay_batch: int = parameter(32, 'trials a gradient step', low=1, high=4096)

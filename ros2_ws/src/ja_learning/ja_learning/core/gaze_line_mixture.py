@@ -2,12 +2,15 @@
 
     p(c | face) = sum_k w_k N(c; o + r_k u, r_k^2 (s_r^2 u u^T + s_u^2 I) + s_c^2 I),  u = u(face)
 
+Where the distance of a thing is known, the sum over stretches is replaced by one term: u is the
+direction from her eyes (`LineMixture.log_from_eyes`).
+
 Torch learns it, numpy evaluates it: torch releases the interpreter in each of its operations, and
 an answer that is due soon would then wait for the thread that learns.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -33,6 +36,11 @@ class LineMixture(Generic[Array]):
     of_gaze: Array
     of_place: Array
 
+    def as_numpy(self: 'LineMixture[torch.Tensor]') -> 'LineMixture[NDArray[np.float64]]':
+        """Copy the numbers as arrays."""
+        arrays = {name: each.detach().numpy().astype(float) for name, each in vars(self).items()}
+        return LineMixture(**arrays)
+
     def on_line(self, pan: Array, tilt: Array) -> tuple[Array, Array]:
         """Return o + r_k u for gazes (members, n, 1): (members, n, stretches), pan and tilt."""
         return self.stretches * pan, self.origin_tilt + self.stretches * tilt
@@ -56,6 +64,31 @@ class LineMixture(Generic[Array]):
         peak = self.log_shares - 0.5 * log(across * along) - math.log(2 * math.pi)
         at_zero = peak - 0.5 * (at_pan * to_pan + at_tilt * to_tilt)
         return [at_zero, to_pan, to_tilt, -0.5 * pans, -both, -0.5 * tilts]
+
+    def log_from_eyes(
+        self,
+        gaze: tuple[Array, Array],
+        direction: Iterable[Array],
+        her_distance: Array,
+        covariance: Iterable[Array],
+        log: Callable[[Array], Array],
+        exp: Callable[[Array], Array],
+    ) -> Array:
+        """Return log p, (members, n, m), of things whose direction from her eyes is known.
+
+        The same u, now as a direction from her eyes: N(d; u + (0, o h), S + (s_u^2 + s_c^2 h^2)
+        I), with the direction d, her distance h and the covariance S as in `directions_from_eyes`.
+        The factor sum_k w_k / r_k^2 makes it comparable with places in the view: as a likelihood
+        of u both then have the same integral.
+        """
+        (pan, tilt), (at_pan, at_tilt), (var_pan, both, var_tilt) = gaze, direction, covariance
+        spread = self.of_gaze + self.of_place * her_distance**2
+        var_pan, var_tilt = var_pan + spread, var_tilt + spread
+        off_pan, off_tilt = at_pan - pan, at_tilt - self.origin_tilt * her_distance - tilt
+        determinant = var_pan * var_tilt - both**2
+        squares = var_tilt * off_pan**2 - 2 * both * off_pan * off_tilt + var_pan * off_tilt**2
+        factor = log((exp(self.log_shares) / self.stretches**2).sum(-1))[..., None]
+        return factor - 0.5 * (squares / determinant + log(determinant)) - math.log(2 * math.pi)
 
 
 def powers(pan: Array, tilt: Array) -> list[Array]:

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from torch import nn
 
 from ja_learning.core.gaze_line_mixture import LineMixture, powers
+from ja_learning.core.gaze_line_places import COVARIANCE, FROM_EYES, HER_DISTANCE, IN_VIEW
 from ja_learning.core.trial import FACE_SHAPE
 
-ANGLE_SCALE_RAD = float(np.radians(40))
 STRETCHES = torch.exp(torch.linspace(np.log(0.35), np.log(2.2), 9))
 _HIDDEN = 64
 # Of the pixels, 0-255, of a face that is not to be blown up.
@@ -93,18 +93,45 @@ class GazeLineNetwork(nn.Module):
     ) -> torch.Tensor:
         """Return log p(c | face), (members, n, m), less log of its mean; -inf where c is NaN.
 
-        `places`: (members or 1, n or 1, m, 2), seen in a trial; `negatives`: (members, k, 2), seen
-        in others. The mean is over both, so that no ratio is beyond their number.
+        `places`: (members or 1, n or 1, m, 8), seen in a trial; `negatives`: (members, k, 8), seen
+        in others; columns as in `gaze_line_places`. The mean is over both, so that no ratio is
+        beyond their number.
         """
         forms, missing = self._forms(gaze), torch.isnan(places[..., 0])
-        here = torch.logsumexp(_powers(torch.nan_to_num(places)) @ forms, dim=-1)
+        here = torch.logsumexp(_powers(torch.nan_to_num(places[..., IN_VIEW])) @ forms, dim=-1)
+        here = self._with_ranges(here, gaze, places)
         here = here.masked_fill(missing, -torch.inf)
         # One product for each member, not for each of its gazes.
-        there = _powers(negatives) @ forms.transpose(1, 2).flatten(2)
-        there = torch.logsumexp(there.unflatten(2, (-1, len(STRETCHES))), dim=(1, 3))
+        there = _powers(negatives[..., IN_VIEW]) @ forms.transpose(1, 2).flatten(2)
+        there = there.unflatten(2, (-1, len(STRETCHES)))
+        if torch.isnan(negatives[..., HER_DISTANCE]).all():
+            there = torch.logsumexp(there, dim=(1, 3))
+        else:
+            each = torch.logsumexp(there, dim=3).transpose(1, 2)
+            there = torch.logsumexp(self._with_ranges(each, gaze, negatives[:, None]), dim=2)
         total = torch.logaddexp(torch.logsumexp(here, dim=-1), there)
         count = (~missing).sum(-1) + negatives.shape[1]
         return here - (total - torch.log(count))[..., None]
+
+    def _with_ranges(
+        self, line: torch.Tensor, gaze: torch.Tensor, places: torch.Tensor
+    ) -> torch.Tensor:
+        """Return `line` (members, n, m), replaced where the distances of places are known."""
+        known = ~torch.isnan(places[..., HER_DISTANCE])
+        if not known.any():
+            return line
+        # Where unknown, any number will do, but NaN would spread to the gradients.
+        places = torch.nan_to_num(places, nan=1.0)
+        pan, tilt = gaze.split(1, dim=-1)
+        from_eyes = self.mixture().log_from_eyes(
+            (pan, tilt),
+            places[..., FROM_EYES].unbind(-1),
+            places[..., HER_DISTANCE],
+            places[..., COVARIANCE].unbind(-1),
+            torch.log,
+            torch.exp,
+        )
+        return torch.where(known, from_eyes, line)
 
     def _forms(self, gaze: torch.Tensor) -> torch.Tensor:
         """Return the forms of the parts of p(c | face), (members, n, 6, stretches)."""

@@ -5,7 +5,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ja_learning.core.trial import Trial
+from ja_learning.core.trial import Look, Trial
 
 
 class Predictor(Protocol):
@@ -16,18 +16,24 @@ class Predictor(Protocol):
         """Return the evidence [nats] that the face informs the learner; at first 0."""
 
     def propose(
-        self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike
-    ) -> NDArray[np.float64]:
+        self,
+        look: Look,
+        posture: ArrayLike,
+        candidates: ArrayLike,
+        ranges: ArrayLike | None = None,
+    ) -> NDArray[np.float64] | None:
         """Return a change of posture (2,) [rad] towards the gaze target.
 
-        `face`: uint8 (30, 25), seen in the direction `face_at` (2,) [rad]; `posture` (2,): where
-        the head is now; `candidates` (m, 2): directions of the objects seen in this trial.
+        `posture` (2,): where the head is now; `candidates` (m, 2): directions of the objects seen
+        in this trial; `ranges` (m, 2) [m]: as in `Trial`. None where the look shows this learner
+        nothing: no landmarks were read, and it reads nothing else.
         """
 
-    def belief(
-        self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
-    ) -> NDArray[np.float64]:
-        """Draw directions (count, 2) [rad] from the belief about the gaze target."""
+    def belief(self, look: Look, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+        """Draw directions (count, 2) [rad] from the belief about the gaze target.
+
+        (0, 2) where the look shows this learner nothing.
+        """
 
 
 class TrainablePredictor(Predictor, Protocol):

@@ -12,15 +12,23 @@ from ja_learning.core.network_config import NetworkConfig
 
 
 class LearnerEntry(NamedTuple):
-    """Where a learner's class is, `module:class`, and the configuration that it takes."""
+    """Where a learner's class is, `module:class`, and the configuration that it takes.
+
+    `from_landmarks`: the class, where the configuration has `face_reader: landmarks`.
+    """
 
     learner: str
     config: type[Configuration]
+    from_landmarks: str = ''
 
 
 LEARNERS: Mapping[str, LearnerEntry] = {
     'paper': LearnerEntry('ja_learning.core.network:ThreeLayerNetwork', NetworkConfig),
-    'gaze_line': LearnerEntry('ja_learning.core.gaze_line:GazeLineLearner', GazeLineConfig),
+    'gaze_line': LearnerEntry(
+        'ja_learning.core.gaze_line:GazeLineLearner',
+        GazeLineConfig,
+        'ja_learning.core.landmark_learner:LandmarkLearner',
+    ),
 }
 """Every learner, by its `kind`; the first is the default."""
 
@@ -48,6 +56,8 @@ def make_learner(kind: str, seed: int, config: Configuration | None = None) -> L
     if not isinstance(config, entry.config):
         wanted, found = entry.config.__name__, type(config).__name__
         raise ConfigError(f'the learner {kind} takes a {wanted}, not a {found}')
-    module, _, name = entry.learner.partition(':')
+    reads_landmarks = getattr(config, 'face_reader', '') == 'landmarks'
+    where = entry.from_landmarks if reads_landmarks else entry.learner
+    module, _, name = where.partition(':')
     make: Any = getattr(import_module(module), name)
     return make(config, seed)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ja_learning.core.checkpoint_arrays import count, numbers
 from ja_learning.core.evidence import Evidence
 from ja_learning.core.network_config import NetworkConfig
-from ja_learning.core.trial import FACE_SHAPE, Trial
+from ja_learning.core.trial import FACE_SHAPE, Look, Trial
 
 INPUTS = FACE_SHAPE[0] * FACE_SHAPE[1] + 2
 
@@ -53,18 +53,20 @@ class ThreeLayerNetwork:
         return output.numpy().astype(float) * self.config.angle_scale_rad
 
     def propose(
-        self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike, candidates: ArrayLike
+        self,
+        look: Look,
+        posture: ArrayLike,
+        candidates: ArrayLike,
+        ranges: ArrayLike | None = None,
     ) -> NDArray[np.float64]:
         """Return the same as `predict`: the paper's learner does not use the candidates."""
-        return self.predict(face, posture)
+        return self.predict(look.face, posture)
 
-    def belief(
-        self, face: ArrayLike, face_at: ArrayLike, rng: np.random.Generator, count: int
-    ) -> NDArray[np.float64]:
+    def belief(self, look: Look, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
         """Draw directions (count, 2) [rad] about the one that it proposes from the look."""
         off = self.config.believed_within_rad * rng.standard_normal((count, 2))
         # A head that attends to a face is turned towards it.
-        return np.asarray(face_at, float) + self.predict(face, face_at) + off
+        return look.face_at + self.predict(look.face, look.face_at) + off
 
     def log_density(
         self, faces: ArrayLike, face_at: ArrayLike, directions: ArrayLike

@@ -6,28 +6,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ja_learning.core.checkpoint_arrays import counts, numbers
-from ja_learning.core.trial import FACE_SHAPE
+from ja_learning.core.gaze_line_places import IN_VIEW, PLACE_COLUMNS, known_from_eyes
+from ja_learning.core.trial import PICTURE, FaceFormat
+
+_FROM_EYES = slice(2, PLACE_COLUMNS)
 
 MOST_CANDIDATES = 32
 """Of the objects seen in a trial, at most the first so many are remembered."""
 
 
 class ReplayMemory:
-    """A ring of faces, uint8 (n, 30, 25), and the places seen with them, (n, m, 2), NaN-padded."""
+    """A ring of faces and the places seen with them, (n, m, 8), NaN-padded.
 
-    def __init__(self, capacity: int) -> None:
+    A face is what the learner reads of it; the columns of places are those of `gaze_line_places`.
+    """
+
+    def __init__(self, capacity: int, faces: FaceFormat = PICTURE) -> None:
         """Start empty; a full memory of `capacity` trials drops its oldest."""
         self._capacity = capacity
-        self._faces = np.zeros((0, *FACE_SHAPE), np.uint8)
-        self._places = np.zeros((0, MOST_CANDIDATES, 2), np.float32)
+        self._faces: NDArray[Any] = np.zeros((0, *faces.shape), faces.dtype)
+        self._places = np.zeros((0, MOST_CANDIDATES, PLACE_COLUMNS), np.float32)
         self._newest = -1
         self._count = 0
 
     def __len__(self) -> int:
         return self._count
 
-    def remember_trial(self, face: NDArray[np.uint8], places: NDArray[np.floating]) -> None:
-        """Remember a face and the places (m, 2) seen with it; a full memory drops its oldest."""
+    def remember_trial(self, face: NDArray[Any], places: NDArray[np.floating]) -> None:
+        """Remember a face and the places (m, 8) seen with it; a full memory drops its oldest."""
         if self._count == len(self._faces) < self._capacity:
             self._grow()
         self._newest = (self._newest + 1) % len(self._faces)
@@ -37,8 +43,8 @@ class ReplayMemory:
         self._places[self._newest] = np.nan
         self._places[self._newest, : len(kept)] = kept
 
-    def trials_at(self, ages: NDArray[np.int64]) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """Return faces (..., 30, 25) and places (..., m, 2) of these ages, the newest 0."""
+    def trials_at(self, ages: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[np.float32]]:
+        """Return faces and places (..., m, 8) of these ages, the newest 0."""
         index = self._index(ages)
         widest = int(self._seen(index).max(initial=0))
         return self._faces[index], self._places[index, :widest]
@@ -46,7 +52,7 @@ class ReplayMemory:
     def places_at(
         self, ages: NDArray[np.int64], which: NDArray[np.floating]
     ) -> NDArray[np.float32]:
-        """Return one place (..., 2) of each of these ages: `which`, 0-1, of those seen."""
+        """Return one place (..., 8) of each of these ages: `which`, 0-1, of those seen."""
         index = self._index(ages)
         return self._places[index, (which * self._seen(index)).astype(int)]
 
@@ -62,24 +68,42 @@ class ReplayMemory:
         """Return all that is remembered, oldest first, as named arrays."""
         faces, places = self.trials_at(np.arange(self._count)[::-1])
         there = ~np.isnan(places[..., 0])
-        return {
+        seen = places[there]
+        known = known_from_eyes(seen)
+        arrays = {
             'faces': faces,
             'candidate_counts': there.sum(axis=-1),
-            'candidates': places[there],
+            'candidates': seen[:, IN_VIEW],
         }
+        if known.any():  # no number of a state is NaN
+            arrays['candidates_with_range'] = np.flatnonzero(known)
+            arrays['candidates_from_eyes'] = seen[known][:, _FROM_EYES]
+        return arrays
 
     @classmethod
-    def restored(cls, arrays: dict[str, NDArray[Any]], capacity: int) -> 'ReplayMemory':
-        """Make a memory from `state()`; ValueError if it is none."""
+    def restored(
+        cls, arrays: dict[str, NDArray[Any]], capacity: int, faces: FaceFormat = PICTURE
+    ) -> 'ReplayMemory':
+        """Make a memory from `state()`; ValueError if it is none of such faces."""
         seen_in = counts(arrays, 'candidate_counts')
         if len(seen_in) > capacity or (seen_in > MOST_CANDIDATES).any():
             raise ValueError(
                 f'candidate_counts must be at most {capacity}, each up to {MOST_CANDIDATES}'
             )
-        faces = numbers(arrays, 'faces', (len(seen_in), *FACE_SHAPE), np.uint8)
-        places = numbers(arrays, 'candidates', (int(seen_in.sum()), 2))
-        memory = cls(capacity)
-        for face, seen in zip(faces, np.split(places, np.cumsum(seen_in))[:-1], strict=True):
+        remembered = numbers(arrays, 'faces', (len(seen_in), *faces.shape), faces.dtype)
+        in_all = int(seen_in.sum())
+        places = np.full((in_all, PLACE_COLUMNS), np.nan, np.float32)
+        places[:, IN_VIEW] = numbers(arrays, 'candidates', (in_all, 2))
+        if 'candidates_with_range' in arrays:
+            index = counts(arrays, 'candidates_with_range')
+            if (index >= in_all).any():
+                raise ValueError(f'candidates_with_range must be below {in_all}')
+            columns = PLACE_COLUMNS - 2
+            places[index, _FROM_EYES] = numbers(
+                arrays, 'candidates_from_eyes', (len(index), columns)
+            )
+        memory = cls(capacity, faces)
+        for face, seen in zip(remembered, np.split(places, np.cumsum(seen_in))[:-1], strict=True):
             memory.remember_trial(face, seen)
         return memory
 
@@ -92,7 +116,8 @@ class ReplayMemory:
     def _grow(self) -> None:
         more = min(max(64, self._count), self._capacity - self._count)
         faces, places = self.trials_at(np.arange(self._count)[::-1])
-        self._faces = np.concatenate([faces, np.zeros((more, *FACE_SHAPE), np.uint8)])
-        padded = np.full((self._count + more, MOST_CANDIDATES, 2), np.nan, np.float32)
+        self._faces = np.concatenate([faces, np.zeros((more, *faces.shape[1:]), faces.dtype)])
+        shape = (self._count + more, MOST_CANDIDATES, PLACE_COLUMNS)
+        padded = np.full(shape, np.nan, np.float32)
         padded[: self._count, : places.shape[-2]] = places
         self._places, self._newest = padded, self._count - 1

@@ -6,13 +6,26 @@ keeps the objects that were seen in it.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ja_common.core.face_gaze import FaceGaze
+
 FACE_SHAPE = (30, 25)
 """Rows and columns of the picture of the caregiver's face (Nagai et al. 2003, section 3.1)."""
+
+
+class FaceFormat(NamedTuple):
+    """Shape and type of what a learner reads of one face."""
+
+    shape: tuple[int, ...]
+    dtype: type[np.generic]
+
+
+PICTURE = FaceFormat(FACE_SHAPE, np.uint8)
 
 SAME_OBJECT_RAD = 0.05
 """Objects seen nearer to each other than this from two postures are one and the same."""
@@ -37,15 +50,37 @@ def checked_face(face: ArrayLike) -> NDArray[np.uint8]:
     return face
 
 
+def unknown_ranges(count: int) -> NDArray[np.float64]:
+    """Return ranges (count, 2) of which nothing is known: NaN."""
+    return np.full((count, 2), np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """The last image of a look at the caregiver: all that a learner may read her gaze from.
+
+    `face`: uint8 (30, 25), seen in the direction `face_at`, (2,) [rad]. `face_range`: her distance
+    and its standard deviation, (2,) [m]; NaN where unknown. `gaze`: her head pose and eyes as read
+    from landmarks; None where they were not read.
+    """
+
+    face: NDArray[np.uint8]
+    face_at: NDArray[np.float64]
+    face_range: NDArray[np.float64] = field(default_factory=lambda: unknown_ranges(1)[0])
+    gaze: FaceGaze | None = None
+
+
 @dataclass(frozen=True)
 class Trial:
     """One trial, finished: all that a learner learns from.
 
-    `face`: uint8 (30, 25), seen in the direction `face_at`, (2,) [rad]. `postures`: (n, 2) [rad],
+    `face`, `face_at`, `face_range`, `gaze`: the look, as in `Look`. `postures`: (n, 2) [rad],
     where each shift began, the look at the caregiver first. `fixation`: (2,) [rad], direction of
     the object fixated at the end, or None when the trial was given up.
     `candidates`: (m, 2) [rad], directions of all objects that were seen meanwhile; the first
-    `seen_before_shift` of them were seen before the head acted on the face.
+    `seen_before_shift` of them were seen before the head acted on the face. `ranges`: (m, 2) [m],
+    their distances from the camera and standard deviations; NaN where unknown, None where no
+    distance is known.
     """
 
     face: NDArray[np.uint8]
@@ -54,6 +89,14 @@ class Trial:
     fixation: NDArray[np.float64] | None
     candidates: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
     seen_before_shift: int = 0
+    ranges: NDArray[np.float64] | None = None
+    face_range: NDArray[np.float64] = field(default_factory=lambda: unknown_ranges(1)[0])
+    gaze: FaceGaze | None = None
+
+    @property
+    def look(self) -> Look:
+        """Return the look at the caregiver with which the trial began."""
+        return Look(self.face, self.face_at, self.face_range, self.gaze)
 
     @property
     def led_to(self) -> NDArray[np.float64]:
@@ -73,39 +116,37 @@ class TrialRecorder:
     def __init__(self, same_within_rad: float = SAME_POSTURE_RAD) -> None:
         """Start between two trials; postures nearer than this in both joints are the same."""
         self._same_within = same_within_rad
-        self._face: NDArray[np.uint8] | None = None
-        self._face_at = np.zeros(2)
+        self._look: Look | None = None
         self._postures: list[NDArray[np.float64]] = []
         self._candidates: list[list[float]] = []
+        self._ranges: list[list[float]] = []
         self._seen_before_shift = 0
         self._looking_around = False
 
     @property
-    def face(self) -> NDArray[np.uint8] | None:
-        """Return the face seen in the last look of the trial under way, or None between trials."""
-        return self._face
+    def look(self) -> Look | None:
+        """Return the last image of the look of the trial under way, or None between trials."""
+        return self._look
 
-    def observe_face(
-        self, face: ArrayLike, face_at: ArrayLike, posture: ArrayLike
-    ) -> Trial | None:
+    def observe_look(self, look: Look, posture: ArrayLike) -> Trial | None:
         """Start a trial, or go on with its look: the head attends to the caregiver.
 
-        Her face is seen in the direction `face_at` (2,) [rad], from this posture (2,) [rad].
-        Returns the trial before, if it was given up.
+        She is seen from this posture (2,) [rad]. Returns the trial before, if it was given up.
         """
         given_up = None
-        if self._face is not None and len(self._postures) > 1:
-            given_up = self._finished(self._postures, None)
-        self._face, self._face_at = checked_face(face), np.array(face_at, float)
+        if self._look is not None and len(self._postures) > 1:
+            given_up = self._finished(self._look, self._postures, None)
+        face, face_at = checked_face(look.face), np.array(look.face_at, float)
+        self._look = replace(look, face=face, face_at=face_at)
         self._postures = [np.array(posture, float)]
-        self._candidates = []
+        self._candidates, self._ranges = [], []
         self._seen_before_shift = 0
         self._looking_around = True
         return given_up
 
     def observe_rest(self, posture: ArrayLike) -> None:
         """Record a posture (2,) [rad] at which the head stands still, once if it repeats."""
-        if self._face is not None and not self._same(posture, self._postures[-1]):
+        if self._look is not None and not self._same(posture, self._postures[-1]):
             self._postures.append(np.array(posture, float))
 
     def observe_shift(self) -> None:
@@ -113,27 +154,37 @@ class TrialRecorder:
         self._looking_around = False
 
     @property
-    def face_at(self) -> NDArray[np.float64]:
-        """Return the direction (2,) [rad] in which the face was last seen."""
-        return self._face_at
-
-    @property
     def candidates(self) -> NDArray[np.float64]:
         """Return the directions (m, 2) [rad] of the objects seen in the trial under way."""
         return np.array(self._candidates).reshape(-1, 2)
 
-    def record_candidates(self, directions: ArrayLike) -> None:
-        """Record the directions (m, 2) [rad] of objects seen while the head stands still."""
-        if self._face is None:
+    @property
+    def ranges(self) -> NDArray[np.float64]:
+        """Return their distances and standard deviations, (m, 2) [m]; NaN where unknown."""
+        return np.array(self._ranges).reshape(-1, 2)
+
+    def record_candidates(self, directions: ArrayLike, ranges: ArrayLike | None = None) -> None:
+        """Record the directions (m, 2) [rad] of objects seen while the head stands still.
+
+        `ranges`: (m, 2) [m], as in `Trial`. One that was known stays where the newest is unknown:
+        the camera turns on the spot.
+        """
+        if self._look is None:
             return
-        for direction in np.asarray(directions, float).reshape(-1, 2).tolist():
+        found = np.asarray(directions, float).reshape(-1, 2)
+        known_to = unknown_ranges(len(found)) if ranges is None else np.reshape(ranges, (-1, 2))
+        for direction, its_range in zip(found.tolist(), known_to.tolist(), strict=True):
             # Many and small: numpy would take longer than all else that a proposal takes.
             distances = [math.dist(direction, known) for known in self._candidates]
             nearest = min(distances, default=math.inf)
             if nearest > SAME_OBJECT_RAD:
                 self._candidates.append(direction)
+                self._ranges.append(its_range)
             else:  # the newest sight counts: nearer to the centre, and things move
-                self._candidates[distances.index(nearest)] = direction
+                index = distances.index(nearest)
+                self._candidates[index] = direction
+                if not math.isnan(its_range[0]):
+                    self._ranges[index] = its_range
         if self._looking_around:
             self._seen_before_shift = len(self._candidates)
 
@@ -146,30 +197,35 @@ class TrialRecorder:
         began = self._postures
         if began and self._same(posture, began[-1]):
             began = began[:-1]  # where the last shift ended, none began
-        if self._face is None or not began:
+        if self._look is None or not began:
             return None
-        trial = self._finished(began, np.array(direction, float))
+        trial = self._finished(self._look, began, np.array(direction, float))
         self.drop_trial()
         return trial
 
     def _finished(
-        self, began: list[NDArray[np.float64]], fixation: NDArray[np.float64] | None
+        self,
+        look: Look,
+        began: list[NDArray[np.float64]],
+        fixation: NDArray[np.float64] | None,
     ) -> Trial:
-        assert self._face is not None
         return Trial(
-            self._face,
-            self._face_at,
+            look.face,
+            look.face_at,
             np.array(began),
             fixation,
             self.candidates,
             self._seen_before_shift,
+            self.ranges,
+            look.face_range,
+            look.gaze,
         )
 
     def drop_trial(self) -> None:
         """Drop the trial under way."""
-        self._face = None
+        self._look = None
         self._postures = []
-        self._candidates = []
+        self._candidates, self._ranges = [], []
         self._seen_before_shift = 0
 
     def _same(self, a: ArrayLike, b: ArrayLike) -> bool:

@@ -16,11 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ja_common.core.detection import Detection, caregiver_face, objects
+from ja_common.core.face_gaze import FaceGaze
 from ja_common.core.geometry import directions_of_rays
 from ja_common.core.posture import Posture
 from ja_learning.core.learner import Predictor
 from ja_learning.core.look_around import LookAround, LookAroundConfig
-from ja_learning.core.trial import Trial, TrialRecorder
+from ja_learning.core.trial import Look, Trial, TrialRecorder
 
 BELIEF_SAMPLES = 200
 
@@ -67,15 +69,19 @@ class TrialPipeline:
         self._log_evidence = 0.0
 
     def process_image(
-        self, posture: Posture, rays: ArrayLike, attended: tuple[ArrayLike, ArrayLike] | None
+        self,
+        posture: Posture,
+        detections: list[Detection],
+        face: ArrayLike | None,
+        gaze: FaceGaze | None = None,
     ) -> Proposal:
         """Take one image, and return what the learner proposes on it.
 
-        `rays`: (m, 2), to the objects. `attended`: the face, uint8 (30, 25), and the ray (2,) to
-        it, if the head attends to it.
+        `face`: the picture of the caregiver's face, uint8 (30, 25), if the head attends to it, and
+        `gaze`: her head pose and eyes, if they were read.
         """
-        given_up = self._observe(posture, attended)
-        proposal = self._propose(posture, rays)
+        given_up = self._observe(posture, _look(posture, detections, face, gaze))
+        proposal = self._propose(posture, objects(detections))
         if given_up is not None:
             self._on_trial(given_up, posture)
         return proposal
@@ -92,40 +98,52 @@ class TrialPipeline:
 
     def draw_belief(self, rng: np.random.Generator) -> NDArray[np.float64]:
         """Draw directions (BELIEF_SAMPLES, 2) [rad] of the gaze target; (0, 2) between trials."""
-        face = self._trial.face
-        if face is None:
+        look = self._trial.look
+        if look is None:
             return np.empty((0, 2))
-        return self._predictor().belief(face, self._trial.face_at, rng, BELIEF_SAMPLES)
+        return self._predictor().belief(look, rng, BELIEF_SAMPLES)
 
     def drop_trial(self) -> None:
         """Drop the trial under way."""
         self._trial.drop_trial()
 
-    def _observe(
-        self, posture: Posture, attended: tuple[ArrayLike, ArrayLike] | None
-    ) -> Trial | None:
+    def _observe(self, posture: Posture, look: Look | None) -> Trial | None:
         """Return the trial before, if this image shows that it was given up."""
         here = posture.position
-        if attended is None:
+        if look is None:
             if posture.is_still(self._still_below):
                 self._trial.observe_rest(here)
             return None
-        face, ray = attended
-        given_up = self._trial.observe_face(face, directions_of_rays(here, ray), here)
+        given_up = self._trial.observe_look(look, here)
         self._around.start_trial(here, self._log_evidence)
         return given_up
 
-    def _propose(self, posture: Posture, rays: ArrayLike) -> Proposal:
+    def _propose(self, posture: Posture, seen: list[Detection]) -> Proposal:
         trial, here = self._trial, posture.position
-        if trial.face is None:
+        if trial.look is None:
             return Proposal(self._log_evidence)
         if posture.is_still(self._still_below):
             if not self._around.observe_rest(here):
                 trial.observe_shift()
-            trial.record_candidates(directions_of_rays(here, rays))
+            rays = np.array([each.ray for each in seen]).reshape(-1, 2)
+            trial.record_candidates(directions_of_rays(here, rays), [each.range for each in seen])
         view = self._around.next_view(lambda: self.draw_belief(self._random))
         predictor = self._predictor()
         self._log_evidence = predictor.log_evidence
-        delta = predictor.propose(trial.face, trial.face_at, here, trial.candidates)
+        delta = predictor.propose(trial.look, here, trial.candidates, trial.ranges)
         glance = None if view is None else view - here
         return Proposal(self._log_evidence, delta, glance)
+
+
+def _look(
+    posture: Posture,
+    detections: list[Detection],
+    face: ArrayLike | None,
+    gaze: FaceGaze | None,
+) -> Look | None:
+    """Return the look at the caregiver that this image shows, or None."""
+    seen = caregiver_face(detections)
+    if face is None or seen is None:
+        return None
+    face_at = directions_of_rays(posture.position, seen.ray)
+    return Look(np.asarray(face), face_at, seen.range, gaze)

@@ -1,12 +1,13 @@
 """BlazeFace short range (Bazarevsky et al. 2019) through OpenCV's DNN module."""
 
-from importlib.resources import as_file, files
+from importlib.resources import files
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ja_common.core.config import ConfigError
+from ja_common.core.weight_files import read_weights
 from ja_perception.core.box import Box
 from ja_perception.core.faces import Face, cut_square
 
@@ -30,15 +31,15 @@ def _anchor_centres() -> NDArray[np.float32]:
 
 def _read_network() -> 'cv2.dnn.Net':
     """Read the network, which is stored as ONNX: OpenCV reads TFLite from 4.8 on only."""
-    with as_file(files('ja_perception.models') / _MODEL) as path:
-        try:
-            return cv2.dnn.readNetFromONNX(str(path))
-        except (AttributeError, cv2.error):
-            # A build without the dnn module or without protobuf, or an old one.
-            raise ConfigError(
-                f'OpenCV {cv2.__version__} cannot read the face detector {_MODEL}: install OpenCV '
-                '4.6 or newer with its dnn module, or set face_finder to haar'
-            ) from None
+    content = read_weights(files('ja_perception.models') / _MODEL)
+    try:
+        return cv2.dnn.readNetFromONNX(np.frombuffer(content, np.uint8))
+    except (AttributeError, cv2.error):
+        # A build without the dnn module or without protobuf, or an old one.
+        raise ConfigError(
+            f'OpenCV {cv2.__version__} cannot read the face detector {_MODEL}: install OpenCV '
+            '4.6 or newer with its dnn module, or set face_finder to haar'
+        ) from None
 
 
 class BlazeFace:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.config import Configuration, parameter
 from ja_common.core.detection import Detection, Kind, most_salient
+from ja_common.core.face_gaze import FaceGaze
 from ja_common.core.fixation import WIDTH_SIXTH, stands_in_centre
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_perception.core.box import Box
@@ -16,9 +17,11 @@ from ja_perception.core.face_crop import FACE_COLUMNS, FACE_ROWS, crop_face
 from ja_perception.core.face_tracking import FaceConfig, FaceTracker
 from ja_perception.core.faces import FaceFinder
 from ja_perception.core.features import FeatureConfig
+from ja_perception.core.gaze_reader import GazeReader, GazeReading, StoredGaze
 from ja_perception.core.grouping import GroupingConfig
 from ja_perception.core.motion import MotionConfig
 from ja_perception.core.object_tracking import TrackingConfig
+from ja_perception.core.ranging import ImageRegion, RangeSensor, add_ranges, face_region
 from ja_perception.core.salient_objects import InterestConfig, SalientObjects
 
 
@@ -57,9 +60,9 @@ class Percept:
 
     ``detections``: the caregiver's face first, other faces, then objects, most salient first.
     ``face_image``: (30, 25) uint8 while the head attends to the caregiver, cut from
-    ``face_image_box`` [px]; else both are None. ``motion_judged``: False where motion could not
-    be measured (alpha_mot = 0, the first images, a fast head). ``moving_share``: share of the
-    image that moves.
+    ``face_image_box`` [px]; else both are None. ``gaze_reading``: of the same face, where its gaze
+    is read. ``motion_judged``: False where motion could not be measured (alpha_mot = 0, the first
+    images, a fast head). ``moving_share``: share of the image that moves.
     """
 
     detections: list[Detection]
@@ -67,19 +70,31 @@ class Percept:
     face_image_box: Box | None
     motion_judged: bool
     moving_share: float
+    gaze_reading: GazeReading | None = None
 
     @property
     def target(self) -> Detection | None:
         """Return the object i_trg of Eq. 1; None when no object is seen."""
         return most_salient(self.detections)
 
+    @property
+    def face_gaze(self) -> FaceGaze | None:
+        """Return head pose and eyes of the attended face; None where they are not read."""
+        return None if self.gaze_reading is None else self.gaze_reading.gaze
+
 
 class SalientFeatureDetector:
-    """Finds faces and salient objects in image after image."""
+    """Finds faces and salient objects in image after image; reads gaze with a ``gaze_reader``."""
 
-    def __init__(self, finder: FaceFinder, config: DetectorConfig | None = None) -> None:
+    def __init__(
+        self,
+        finder: FaceFinder,
+        config: DetectorConfig | None = None,
+        gaze_reader: GazeReader | None = None,
+    ) -> None:
         self._finder = finder
         self._config = config or DetectorConfig()
+        self._gaze = None if gaze_reader is None else StoredGaze(gaze_reader)
         self._posture_known = False
         self.reset()
 
@@ -97,12 +112,14 @@ class SalientFeatureDetector:
         stamp_ns: int,
         camera: CameraModel,
         posture: Posture | None,
+        depth: RangeSensor | None = None,
     ) -> Percept:
         """Detect faces and salient objects in an (H, W, 3) uint8 RGB image.
 
         ``posture`` is the head's at the image's stamp. Without one (None) the camera is taken to
         stand still in the base frame, and no face counts as attended: whether the head is still is
-        then not known.
+        then not known. ``depth`` measured the scene at the same time: the detections then have a
+        range where it is known. Raises ValueError where it does not fit the image.
         """
         if self._posture_known != (posture is not None):
             # Directions stored without a posture are not valid with one.
@@ -119,20 +136,33 @@ class SalientFeatureDetector:
         attended = bool(faces) and self._attends(rays[0], posture)
         crop_box = self._crop_box(boxes[0]) if attended else None
         face_image = None if crop_box is None else crop_face(grey, crop_box)
+        reading = None
+        if attended and self._gaze is not None:
+            reading = self._gaze.read(image, grey, boxes[0], camera)
         face_rows: list[Detection] = []
         for face, box, ray in zip(faces, boxes, rays, strict=True):
             x, y = ray.tolist()
             picture_follows = attended and not face_rows
             row = Detection(
-                Kind.FACE, x, y, *box, face.score, face.track_id, attended=picture_follows
-            )
+                Kind.FACE, x, y, *box, face.score, face.track_id, attended=picture_follows,
+                gaze_read=picture_follows and reading is not None,
+            )  # fmt: skip
             face_rows.append(row)
+        detections = face_rows + objects
+        if depth is not None:
+            own = zip(objects, self._objects.masks(), strict=True)
+            regions = [
+                *(face_region(box) for box in boxes),
+                *(ImageRegion(Box(d.u, d.v, d.width, d.height), mask) for d, mask in own),
+            ]
+            detections = add_ranges(detections, depth.depths(image, regions, camera))
         return Percept(
-            face_rows + objects,
+            detections,
             face_image,
             crop_box,
             self._objects.motion_judged,
             self._objects.moving_share,
+            reading,
         )
 
     def _attends(self, ray: NDArray[np.float64], posture: Posture | None) -> bool:

@@ -39,10 +39,11 @@ class GroupingConfig(Configuration):
 
 
 class Region(NamedTuple):
-    """A group of pixels: its box, and how many pixels of bright colour are its own [px]."""
+    """A group of pixels: its box, how many pixels of bright colour are its own [px], and which."""
 
     box: Box
     bright_px: int = 0
+    patch: Patch | None = None
 
 
 class Grouping:
@@ -60,7 +61,9 @@ class Grouping:
             rows = slice(patch.y, patch.y + patch.height)
             columns = slice(patch.x, patch.x + patch.width)
             parts += _parts_by_hue(patch, colour.hue[rows, columns], smallest)
-        return [Region(part.box, part.area) for part in self._without_background(parts, bright)]
+        return [
+            Region(part.box, part.area, part) for part in self._without_background(parts, bright)
+        ]
 
     def group_by_texture(self, edges: Mask) -> list[Region]:
         """Return the places that are dense with edges."""
@@ -80,7 +83,9 @@ class Grouping:
     def _whole_patches(self, mask: Mask) -> list[Region]:
         # In maps as smooth as these it makes no difference, and 8 neighbours are twice as fast.
         patches = patches_of(mask, self._smallest(mask), neighbours=8)
-        return [Region(patch.box) for patch in self._without_background(patches, mask)]
+        return [
+            Region(patch.box, patch=patch) for patch in self._without_background(patches, mask)
+        ]
 
     def _smallest(self, mask: Mask) -> int:
         return max(4, round(self._config.smallest_object_share * mask.size))

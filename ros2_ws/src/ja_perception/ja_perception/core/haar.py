@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ja_common.core.config import ConfigError
+from ja_common.core.weight_files import note_weights_at
 from ja_perception.core.box import Box
 from ja_perception.core.faces import Face, cut_square
 
@@ -23,7 +24,7 @@ def read_cascade(name: str) -> 'cv2.CascadeClassifier':
     folders = [Path(shipped.haarcascades)] if shipped else []
     for folder in (*folders, _SYSTEM_FOLDER):
         if (folder / file).is_file():
-            return cv2.CascadeClassifier(str(folder / file))
+            return cv2.CascadeClassifier(str(note_weights_at(folder / file)))
     raise ConfigError(
         f'{file} is neither with OpenCV {cv2.__version__} nor in {_SYSTEM_FOLDER}: '
         'apt install opencv-data, or set face_finder to blazeface'

@@ -24,6 +24,7 @@ from ja_perception.core.grouping import (
 )
 from ja_perception.core.motion import MotionConfig, MotionDetector
 from ja_perception.core.object_tracking import ObjectTracker, TrackingConfig
+from ja_perception.core.patches import Patch
 
 # The area within d_th of the centre (Eq. 3) at unit focal length: the measure of f_col and f_mot.
 _GAZING_AREA = math.pi * math.tan(WIDTH_SIXTH) ** 2
@@ -70,6 +71,14 @@ class SalientObjects:
         """Was motion judged in the last image? See ``MotionDetector.detect_motion``."""
         self.moving_share = 0.0
         """Share of the last image that moved."""
+        self._patches: list[Patch | None] = []
+
+    def masks(self) -> list[Mask | None]:
+        """Return the own pixels of each object of the last image, in the order of the objects.
+
+        A mask (rows, columns) of 0 and 1 spans the object's box.
+        """
+        return [None if patch is None else patch.mask for patch in self._patches]
 
     def find_objects(
         self,
@@ -110,7 +119,9 @@ class SalientObjects:
             Detection(Kind.OBJECT, x, y, u, v, width, height, score, track_id, f_col, f_edg, f_mot)
             for (x, y), (u, v, width, height), score, track_id, (f_col, f_edg, f_mot) in rows
         ]
-        return sorted(objects, key=lambda item: -item.score)
+        order = sorted(range(len(objects)), key=lambda index: -objects[index].score)
+        self._patches = [regions[index].patch for index in order]
+        return [objects[index] for index in order]
 
     def _maps(
         self,

@@ -20,12 +20,14 @@ class BagMetadata:
     """What a metadata.yaml names; whatever else its version adds is not needed.
 
     `files`: names of files, in order. `types`: types of messages, by topic. `storage`: the format
-    of the files. `problem`: why nothing could be read.
+    of the files. `custom_data`: texts that its recorder added. `problem`: why nothing could be
+    read.
     """
 
     files: list[str] = field(default_factory=list)
     types: dict[str, str] = field(default_factory=dict)
     storage: str = ''
+    custom_data: dict[str, str] = field(default_factory=dict)
     problem: str = ''
 
 
@@ -61,6 +63,7 @@ def read_metadata(folder: Path) -> BagMetadata:
         [name for name in dict.fromkeys(listed) if name],
         types,
         storage if isinstance(storage, str) else '',
+        {str(key): str(text) for key, text in _table(found.get('custom_data')).items()},
     )
 
 

@@ -99,11 +99,16 @@ class TrialSample:
 
 
 def write_dataset(
-    folder: Path, samples: Iterable[TrialSample], options: Sequence[str], licence: str
+    folder: Path,
+    samples: Iterable[TrialSample],
+    options: Sequence[str],
+    licence: str,
+    origins: Mapping[str, Mapping[str, str]] | None = None,
 ) -> Path:
     """Write a data set into a new folder; return the path of its card.
 
-    For the card, `options`: ROS arguments of the export; `licence`: '' when it is not stated.
+    For the card, `options`: ROS arguments of the export; `licence`: '' when it is not stated;
+    `origins`: by recording, what its learner and its eyes started from, as texts by topic.
     Raises ConfigError when there is a data set already, or when there is nothing to write.
     """
     if (folder / TABLE).exists():
@@ -119,7 +124,7 @@ def write_dataset(
         known[sample.target[0]] += 1
     if not rows:
         raise ConfigError('no trial ended in a fixation: there is nothing to write')
-    card = _card(recordings, known, options, licence)
+    card = _card(recordings, known, options, licence, origins or {})
     (folder / CARD).write_text(card, encoding='utf-8')
     pyarrow.parquet.write_table(pyarrow.Table.from_pylist(rows, _SCHEMA), folder / TABLE)
     return folder / CARD
@@ -242,7 +247,11 @@ def _direction(row: Mapping[str, Any], name: str) -> NDArray[np.float64] | None:
 
 
 def _card(
-    recordings: Mapping[str, int], known: Mapping[str, int], options: Sequence[str], licence: str
+    recordings: Mapping[str, int],
+    known: Mapping[str, int],
+    options: Sequence[str],
+    licence: str,
+    origins: Mapping[str, Mapping[str, str]],
 ) -> str:
     template = (resources.files('ja_recording') / 'dataset_card.md').read_text('utf-8')
     versions = {name: metadata.version(name) for name in ('ja_recording', 'numpy', 'pyarrow')}
@@ -252,6 +261,7 @@ def _card(
         .render(
             recordings=recordings,
             known=known,
+            origins=origins,
             options=' '.join(options),
             licence=licence or _LICENCE_UNSTATED,
             columns={name: (str(kind), text) for name, (kind, text) in COLUMNS.items()},

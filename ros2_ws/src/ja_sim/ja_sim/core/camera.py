@@ -38,11 +38,18 @@ class Intrinsics:
 
 @dataclass(frozen=True)
 class Observation:
-    """A picture (H, W, 3) uint8 RGB, stamped with the time of its exposure."""
+    """A picture (H, W, 3) uint8 RGB, stamped with the time of its exposure.
+
+    ``depth`` (H, W) float32: distances along the optical axis [m], NaN where none was measured.
+    ``right`` (H, W, 3) uint8 RGB: the second camera's picture, of the same intrinsics. Both are of
+    the same exposure, and None where the scene's `SensesSpec` has them off.
+    """
 
     image: np.ndarray
     stamp_ns: int
     intrinsics: Intrinsics
+    depth: np.ndarray | None = None
+    right: np.ndarray | None = None
 
     @property
     def fx(self) -> float:

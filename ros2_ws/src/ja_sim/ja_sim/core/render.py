@@ -1,4 +1,4 @@
-"""Pictures without a display: an OpenGL context of its own for one camera of a scene."""
+"""Pictures without a display: an OpenGL context of its own for the cameras of a scene."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def buffer_size(image_size: tuple[int, int]) -> tuple[int, int]:
 
 
 class Renderer:
-    """Draws one camera of a compiled scene into an image (H, W, 3) uint8, RGB.
+    """Draws what cameras of a compiled scene see.
 
     OpenGL belongs to a thread: draw and close in the one that made the renderer.
     """
@@ -47,12 +47,16 @@ class Renderer:
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, camera: str, image_size: tuple[int, int]
     ) -> None:
-        """Open a context; ``image_size``: (width, height) [px]. RenderError without OpenGL."""
+        """Open a context and try it with ``camera``.
+
+        ``image_size``: (width, height) [px]. Raises RenderError without OpenGL.
+        """
         width, height = buffer_size(image_size)
         self._image_size = image_size
         self._model, self._data = model, data
         self._viewport = mujoco.MjrRect(0, 0, width, height)
         self._image = np.empty((height, width, 3), np.uint8)
+        self._depth = np.empty((height, width), np.float32)
         self._gl = _make_context(width, height)
         self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50)
         self._free = weakref.finalize(self, _free, self._context, self._gl)
@@ -61,19 +65,21 @@ class Renderer:
         self._free.atexit = False
         atexit.register(self._free)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+        # Near things at 1, far ones at 0: floating-point numbers then resolve both.
+        self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
         self._scene = mujoco.MjvScene(model, maxgeom=1000)
         self._options = mujoco.MjvOption()
         self._no_perturbation = mujoco.MjvPerturb()
         self._camera = mujoco.MjvCamera()
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
-        self._camera.fixedcamid = model.camera(camera).id
         mujoco.mj_forward(model, data)
-        if self.draw().std() < 1.0:
+        if self.draw(camera).std() < 1.0:
             raise RenderError(f'{ADVICE}; the driver that is there draws empty images')
 
-    def draw(self) -> np.ndarray:
-        """Draw the scene, (H, W, 3) uint8 RGB; its kinematics must be current."""
+    def draw(self, camera: str) -> np.ndarray:
+        """Draw what a camera sees, (H, W, 3) uint8 RGB; the kinematics must be current."""
         self._gl.make_current()
+        self._camera.fixedcamid = self._model.camera(camera).id
         model, data, options, scene = self._model, self._data, self._options, self._scene
         # The room last: the objects hide much of it, and what is hidden costs nothing.
         moving, fixed = mujoco.mjtCatBit.mjCAT_DYNAMIC, mujoco.mjtCatBit.mjCAT_STATIC
@@ -83,6 +89,19 @@ class Renderer:
         mujoco.mjr_readPixels(self._image, None, self._viewport, self._context)
         upright = self._image[::-1]  # OpenGL's first row is the lowest
         return cv2.resize(upright, self._image_size, interpolation=cv2.INTER_AREA)
+
+    def read_depth(self) -> np.ndarray:
+        """Return the distances along the optical axis of the last picture drawn, (H, W) [m]."""
+        self._gl.make_current()
+        mujoco.mjr_readPixels(None, self._depth, self._viewport, self._context)
+        # One sample for each pixel, the one nearest to its centre: an average across an edge
+        # would be the distance of nothing.
+        depth = cv2.resize(
+            self._depth[::-1], self._image_size, interpolation=cv2.INTER_NEAREST_EXACT
+        )
+        extent, lens = self._model.stat.extent, self._model.vis.map
+        near, far = extent * lens.znear, extent * lens.zfar
+        return np.float32(near * far) / (depth * np.float32(far - near) + np.float32(near))
 
     def close(self) -> None:
         """Free the graphics memory."""

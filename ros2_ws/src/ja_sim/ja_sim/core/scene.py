@@ -23,6 +23,7 @@ from ja_sim.core.specs import (
     HeadSpec,
     ObjectsSpec,
     RoomSpec,
+    SensesSpec,
 )
 
 
@@ -39,6 +40,7 @@ class Scene(Configuration):
     caregiver: CaregiverSpec = field(default_factory=CaregiverSpec)
     objects: ObjectsSpec = field(default_factory=ObjectsSpec)
     room: RoomSpec = field(default_factory=RoomSpec)
+    senses: SensesSpec = field(default_factory=SensesSpec)
 
 
 def scene_names() -> list[str]:

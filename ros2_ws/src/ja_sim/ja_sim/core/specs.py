@@ -159,3 +159,50 @@ class RoomSpec(Configuration):
 
     furnished: bool = parameter(True, 'With furniture and clutter, or walls and table only')
     light_variation: float = parameter(0.5, 'How differently each reset is lit', low=0.0, high=1.0)
+
+
+@dataclass(frozen=True)
+class SensesSpec(Configuration):
+    """What the robot's head carries beside its camera: nothing by default.
+
+    The depth sensor is a pair of imagers with matching, as in structured-light and stereo cameras:
+    `core.depth_sensor`. Its errors are stated in disparity, of which depth is the inverse. The
+    defaults are those of a RealSense D435 at 848x480.
+    """
+
+    depth: str = parameter(
+        'none',
+        'Depth pictures: none, with the errors of a real sensor, or as the world is',
+        choices=('none', 'sensor', 'exact'),
+    )
+    depth_range_m: tuple[float, float] = interval_parameter(
+        (0.25, 4.0), 'Nearest and farthest depth that is measured', 0.02, 8.0
+    )
+    depth_baseline_m: float = parameter(
+        0.05, 'Between the two imagers of the depth sensor', low=0.005, high=0.5
+    )
+    depth_focal_px: float = parameter(
+        617.0, "Focal length of the depth sensor, in its own imager's pixels", low=50.0, high=1e4
+    )
+    disparity_noise_px: float = parameter(
+        0.1, 'Standard deviation of a disparity', low=0.0, high=5.0
+    )
+    disparity_step_px: float = parameter(
+        0.03125, 'Resolution of a disparity; 0 for none', low=0.0, high=2.0
+    )
+    matching_window_px: float = parameter(
+        5.0, 'Width over which errors of neighbouring pixels are alike', low=0.0, high=50.0
+    )
+    grazing_deg: float = parameter(
+        80.0, 'Surfaces turned away by more than this give no depth', low=10.0, high=90.0
+    )
+    depth_scale_deviation: float = parameter(
+        0.01,
+        'Standard deviation of the relative error that is the same in a whole run (calibration)',
+        low=0.0,
+        high=0.1,
+    )
+    second_camera: bool = parameter(False, 'A second camera of the same kind to the right')
+    baseline_m: float = parameter(
+        0.06, 'From the camera to the second camera', low=0.005, high=0.5
+    )

@@ -24,14 +24,17 @@ from ja_common.core.geometry import (
 from ja_sim.core.behaviour import ROBOT, Blinking, CaregiverBehaviour
 from ja_sim.core.camera import Intrinsics, Observation, expose
 from ja_sim.core.caregiver import CaregiverBodies, draw_appearance
+from ja_sim.core.depth_sensor import DepthSensor
 from ja_sim.core.gaze import GazePose, GazeShift, missed_point
 from ja_sim.core.head import JointSample, PanTiltHead
 from ja_sim.core.light import Lighting
 from ja_sim.core.objects import Arrangement, ObjectBodies, SceneObject
 from ja_sim.core.render import Renderer, buffer_size
 from ja_sim.core.scene import Scene
+from ja_sim.core.specs import SensesSpec
 
 START_NS = 1_000_000_000  # a stamp of zero means 'no time' in ROS
+_CAMERA, _RIGHT_CAMERA = 'eye', 'right_eye'
 
 
 @dataclass(frozen=True)
@@ -40,9 +43,9 @@ class WorldTruth:
 
     ``attended`` is an index into ``object_ids`` (N,), ``positions`` (N, 3) and ``directions``
     (N, 2) [rad], -1 before the first trial. ``face_direction`` (2,) [rad] is where her face is,
-    ``head`` (2,) her head's yaw and pitch (positive to her left, and down), ``gaze_target`` (3,)
-    the point she looks at. ``in_view_at_look``: whether the robot, when it looked at her and
-    the trial began, had the attended object in view.
+    ``face_position`` (3,) its centre, ``head`` (2,) her head's yaw and pitch (positive to her
+    left, and down), ``gaze_target`` (3,) the point she looks at. ``in_view_at_look``: whether the
+    robot, when it looked at her and the trial began, had the attended object in view.
     """
 
     stamp_ns: int
@@ -52,6 +55,7 @@ class WorldTruth:
     positions: np.ndarray
     directions: np.ndarray
     face_direction: np.ndarray
+    face_position: np.ndarray
     head: np.ndarray
     gaze_target: np.ndarray
     reliable: bool
@@ -84,7 +88,7 @@ class JointAttentionWorld:
         spec = _room(scene)
         self._caregiver = CaregiverBodies(spec, scene.caregiver)
         self._objects = ObjectBodies(spec, scene.objects.count)
-        _add_camera(spec, self.intrinsics)
+        _add_cameras(spec, self.intrinsics, scene.senses)
         self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
         self._caregiver.bind_model(self._model)
@@ -108,10 +112,10 @@ class JointAttentionWorld:
     def reset(self, seed: int | None = None) -> None:
         """Restart at time zero, with another seed if one is given."""
         self._seed = self._seed if seed is None else seed
-        streams = np.random.SeedSequence(self._seed).spawn(6)
-        looks, objects, behaviour, blinks, self._encoder_rng, self._image_rng = map(
-            np.random.default_rng, streams
-        )
+        # The first streams stay the same when more are added.
+        streams = np.random.SeedSequence(self._seed).spawn(8)
+        looks, objects, behaviour, blinks, *senses = map(np.random.default_rng, streams)
+        self._encoder_rng, self._image_rng, self._right_image_rng, depth = senses
         self._now_ns = START_NS
         self.clamped = False
         self._head.reset()
@@ -127,6 +131,7 @@ class JointAttentionWorld:
         self._turned_s = 0.0
         self._frame_buffer: deque[_Exposure] = deque([self._view()])
         self._observation: Observation | None = None
+        self._depth_sensor = DepthSensor(self.scene.senses, self.intrinsics, depth)
         self._sample = self._head.read_encoders(self._now_ns, self._encoder_rng)
 
     def rearrange(self) -> None:
@@ -167,22 +172,32 @@ class JointAttentionWorld:
         view = self._frame_buffer[0]
         stamp_ns = view.truth.stamp_ns
         if self._observation is None or self._observation.stamp_ns != stamp_ns:
-            sharp = self._draw(view)
-            image = expose(sharp, view.velocity, self.intrinsics, self.scene.head, self._image_rng)
-            self._observation = Observation(image, stamp_ns, self.intrinsics)
+            image = self._expose(self._draw(view), view, self._image_rng)
+            # Of the picture just drawn, so before the second camera's.
+            depth = self._measure_depth()
+            right = None
+            if self.scene.senses.second_camera:
+                sharp = self._open_renderer().draw(_RIGHT_CAMERA)
+                right = self._expose(sharp, view, self._right_image_rng)
+            self._observation = Observation(image, stamp_ns, self.intrinsics, depth, right)
         return self._observation
 
     def render_picture(
-        self, head: np.ndarray | None = None, eyes_closed: bool | None = None
+        self,
+        head: np.ndarray | None = None,
+        eyes_closed: bool | None = None,
+        eyes: np.ndarray | None = None,
     ) -> np.ndarray:
         """Render a sharp picture (H, W, 3) of this moment, with her head turned as given.
 
-        ``head`` (2,) [rad] is yaw and pitch; her eyes then look straight ahead. For experiments;
-        the world does not change.
+        ``head`` (2,) [rad] is yaw and pitch, ``eyes`` (2, 2) those of her left and right eye in
+        the head; without them her eyes look straight ahead. For experiments; the world does not
+        change.
         """
         view = self._view()
         if head is not None:
-            view = replace(view, gaze=GazePose(np.asarray(head, float), np.zeros((2, 2))))
+            turned = np.zeros((2, 2)) if eyes is None else np.asarray(eyes, float)
+            view = replace(view, gaze=GazePose(np.asarray(head, float), turned))
         if eyes_closed is not None:
             view = replace(view, eyes_closed=eyes_closed)
         return self._draw(view)
@@ -204,6 +219,7 @@ class JointAttentionWorld:
             positions=positions,
             directions=directions_of_vectors(positions),
             face_direction=directions_of_vectors(face),
+            face_position=face,
             head=self._gaze.pose(self._time_s).head,
             gaze_target=self._gaze_point(),
             reliable=response.reliable,
@@ -317,10 +333,24 @@ class JointAttentionWorld:
         mujoco.mju_mat2Quat(data.mocap_quat[self._camera_mocap], rotation.ravel())
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_camlight(self._model, data)
+        return self._open_renderer().draw(_CAMERA)
+
+    def _open_renderer(self) -> Renderer:
         if self._renderer is None:
             size = (self.intrinsics.width, self.intrinsics.height)
-            self._renderer = Renderer(self._model, data, 'eye', size)
-        return self._renderer.draw()
+            self._renderer = Renderer(self._model, self._data, _CAMERA, size)
+        return self._renderer
+
+    def _expose(self, sharp: np.ndarray, view: _Exposure, rng: np.random.Generator) -> np.ndarray:
+        return expose(sharp, view.velocity, self.intrinsics, self.scene.head, rng)
+
+    def _measure_depth(self) -> np.ndarray | None:
+        """Return the depth (H, W) [m] of the picture just drawn; None where the scene has none."""
+        kind = self.scene.senses.depth
+        if kind == 'none':
+            return None
+        exact = self._open_renderer().read_depth()
+        return exact if kind == 'exact' else self._depth_sensor.measure(exact)
 
 
 def _room(scene: Scene) -> mujoco.MjSpec:
@@ -331,16 +361,24 @@ def _room(scene: Scene) -> mujoco.MjSpec:
     return spec
 
 
-def _add_camera(spec: mujoco.MjSpec, intrinsics: Intrinsics) -> None:
-    """Add a camera that looks along x of a body at the origin, with these intrinsics."""
+def _add_cameras(spec: mujoco.MjSpec, intrinsics: Intrinsics, senses: SensesSpec) -> None:
+    """Add a camera that looks along x of a body at the origin, with these intrinsics.
+
+    A second camera of the same kind stands to its right, at the baseline that the scene sets.
+    """
     size = [intrinsics.width, intrinsics.height]
     body = spec.worldbody.add_body(name='camera', mocap=True)
-    body.add_camera(
-        name='eye',
-        quat=[0.5, 0.5, -0.5, -0.5],
-        resolution=size,
-        sensor_size=size,
-        focal_pixel=[intrinsics.fx, intrinsics.fy],
-    )
+    places = {_CAMERA: 0.0}
+    if senses.second_camera:
+        places[_RIGHT_CAMERA] = -senses.baseline_m  # y points to the left
+    for name, y in places.items():
+        body.add_camera(
+            name=name,
+            pos=[0.0, y, 0.0],
+            quat=[0.5, 0.5, -0.5, -0.5],
+            resolution=size,
+            sensor_size=size,
+            focal_pixel=[intrinsics.fx, intrinsics.fy],
+        )
     width, height = buffer_size((intrinsics.width, intrinsics.height))
     spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height

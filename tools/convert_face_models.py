@@ -1,11 +1,12 @@
-"""Convert BlazeFace from TensorFlow Lite to ONNX, which OpenCV reads from 4.5 on (TFLite: 4.8).
+"""Convert a network of MediaPipe's from TensorFlow Lite to ONNX, which OpenCV 4.6 can read.
 
     pip install onnx==1.23.2 tflite==2.18.0 numpy
-    python tools/convert_blazeface.py face_detection_short_range.tflite blazeface_short_range.onnx
+    python tools/convert_face_models.py face_landmark.tflite face_landmark.onnx
 
-The layers and the weights stay as they are: the weights are written with 32 bits instead of 16,
-which holds each of them exactly, and channels come before rows and columns (NCHW), as ONNX wants
-them. `tests/ja_perception/test_blazeface.py` has outputs of the original to compare with.
+OpenCV reads ONNX from 4.5 on, TFLite from 4.8. The layers and the weights stay as they are:
+weights of 16 bits are written with 32, which holds each of them exactly, and channels come before
+rows and columns (NCHW), as ONNX wants them. `tests/ja_perception/test_face_models.py` has outputs
+of the originals to compare with.
 """
 
 import sys
@@ -32,8 +33,8 @@ class Converter:
         self._graph = self._model.Subgraphs(0)
         self._weights: dict[str, NDArray] = {}
 
-    def convert(self) -> onnx.ModelProto:
-        """Return the same network with an input (1, 3, H, W) and the original outputs."""
+    def convert(self, name: str) -> onnx.ModelProto:
+        """Return the same network with an input (1, 3, H, W), and the outputs as NCHW."""
         nodes = [node for i in range(self._graph.OperatorsLength()) for node in self._nodes(i)]
         (source,) = self._graph.InputsAsNumpy()
         _, height, width, channels = self._shape(source)
@@ -42,14 +43,14 @@ class Converter:
             helper.make_tensor_value_info(self._name(source), TensorProto.FLOAT, image),
         ]
         outputs = [
-            helper.make_tensor_value_info(self._name(i), TensorProto.FLOAT, self._shape(i))
+            helper.make_tensor_value_info(self._name(i), TensorProto.FLOAT, self._nchw(i))
             for i in self._graph.OutputsAsNumpy()
         ]
         weights = [numpy_helper.from_array(array, n) for n, array in self._weights.items()]
-        graph = helper.make_graph(nodes, 'blazeface_short_range', inputs, outputs, weights)
+        graph = helper.make_graph(nodes, name, inputs, outputs, weights)
         opset = [helper.make_opsetid('', _OPSET)]
         model = helper.make_model(
-            graph, opset_imports=opset, ir_version=_IR_VERSION, producer_name='convert_blazeface'
+            graph, opset_imports=opset, ir_version=_IR_VERSION, producer_name='convert_face_models'
         )
         onnx.checker.check_model(model, full_check=True)
         return model
@@ -59,6 +60,10 @@ class Converter:
 
     def _shape(self, tensor: int) -> list[int]:
         return self._graph.Tensors(tensor).ShapeAsNumpy().tolist()
+
+    def _nchw(self, tensor: int) -> list[int]:
+        shape = self._shape(tensor)
+        return [shape[i] for i in (0, 3, 1, 2)] if len(shape) == 4 else shape
 
     def _array(self, tensor: int) -> NDArray:
         data = self._model.Buffers(self._graph.Tensors(tensor).Buffer()).DataAsNumpy()
@@ -76,6 +81,9 @@ class Converter:
         if kind == Op.DEQUANTIZE:
             self._weights[name] = self._array(inputs[0]).astype(np.float32)
         elif kind in (Op.CONV_2D, Op.DEPTHWISE_CONV_2D):
+            for tensor, weight in zip(inputs[1:], names[1:], strict=True):
+                if weight not in self._weights:  # with 32 bits already
+                    self._weights[weight] = self._array(tensor)
             kernel = self._weights[names[1]]
             deep = kind == Op.DEPTHWISE_CONV_2D
             # (1, h, w, channels) for each channel alone, else (out, h, w, in).
@@ -98,12 +106,16 @@ class Converter:
             amounts = self._array(inputs[1])[[0, 3, 1, 2]].T.astype(np.int64).ravel()
             self._weights[f'{name}/pads'] = amounts
             yield helper.make_node('Pad', [names[0], f'{name}/pads'], [name], mode='constant')
+        elif kind == Op.PRELU:
+            # One slope a channel: (1, 1, channels) here, (channels, 1, 1) there.
+            self._weights[names[1]] = self._array(inputs[1]).transpose(2, 0, 1)
+            yield helper.make_node('PRelu', names, [name])
         elif kind in (Op.RELU, Op.ADD):
             if kind == Op.ADD:
                 _refuse_fused(_read(tflite.AddOptions, options))
             yield helper.make_node('Relu' if kind == Op.RELU else 'Add', names, [name])
         elif kind == Op.RESHAPE:
-            # The anchors go by rows, columns and then channels.
+            # What is reshaped goes by rows, columns and then channels.
             shape = np.array(self._shape(target), np.int64)
             self._weights[f'{name}/shape'] = shape
             yield helper.make_node('Transpose', names[:1], [f'{name}/nhwc'], perm=(0, 2, 3, 1))
@@ -134,5 +146,6 @@ def _window(options: object) -> dict:
 
 if __name__ == '__main__':
     given, made = map(Path, sys.argv[1:])
-    made.write_bytes(Converter(given.read_bytes()).convert().SerializeToString(deterministic=True))
+    model = Converter(given.read_bytes()).convert(made.stem)
+    made.write_bytes(model.SerializeToString(deterministic=True))
     print(f'{made}: {made.stat().st_size} bytes')

@@ -1,0 +1,108 @@
+"""The trials whose likelihood a posterior over maps needs, each with its table over gazes."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ja_learning.core.gaze_features import Features, FeaturesOf
+from ja_learning.core.gaze_table import SHAPE, gaze_table
+from ja_learning.core.replay_memory import ReplayMemory
+
+
+class SeenTrials(NamedTuple):
+    """Trials as the likelihood needs them.
+
+    `features`: of their faces; `tables` (t, *SHAPE) as of `gaze_table`; `counts` (t,): candidates;
+    `chance`: the mean table of one candidate, of `SHAPE`.
+    """
+
+    features: Features
+    tables: NDArray[np.float32]
+    counts: NDArray[np.int64]
+    chance: NDArray[np.float32]
+
+    def part(self, which: slice) -> 'SeenTrials':
+        """Return some of the trials."""
+        features = Features(*(each[which] for each in self.features))
+        return SeenTrials(features, self.tables[which], self.counts[which], self.chance)
+
+
+class TrialTables:
+    """The tables of the newest trials of a memory, at most `capacity`.
+
+    All of it follows from what the memory has, so that no file needs it. A memory without this
+    many trials must have grown by one with each call of `add_newest`.
+    """
+
+    def __init__(self, memory: ReplayMemory, features_of: FeaturesOf, capacity: int) -> None:
+        """Make the tables of the trials that are there, the oldest first."""
+        self._memory, self._features_of, self._capacity = memory, features_of, capacity
+        self._tables = np.zeros((0, *SHAPE), np.float32)
+        self._counts = np.zeros(0, np.int64)
+        self._sum = np.zeros(SHAPE)
+        self._newest, self._count = -1, 0
+        self._features = features_of(memory.trials_at(np.arange(0))[0])
+        for age in range(min(len(memory), capacity))[::-1]:
+            self._add(age)
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add_newest(self) -> None:
+        """Add the trial that the memory has got last."""
+        self._add(0)
+
+    def use_features(self, features_of: FeaturesOf) -> None:
+        """Describe all faces by other features."""
+        self._features_of = features_of
+        ages = (self._newest - np.arange(len(self._tables))) % max(len(self._tables), 1)
+        ages = np.minimum(ages, max(len(self._memory) - 1, 0))
+        self._features = features_of(self._memory.trials_at(ages)[0])
+
+    def all(self) -> SeenTrials:
+        """Return all of them, in any order."""
+        return self._chosen(slice(0, self._count))
+
+    def newest(self) -> SeenTrials:
+        """Return the newest alone."""
+        return self._chosen(slice(self._newest, self._newest + 1))
+
+    def chance(self) -> NDArray[np.float32]:
+        """Return the mean table of one candidate of all trials, of `SHAPE`."""
+        return (self._sum / max(self._counts.sum(), 1)).astype(np.float32)
+
+    def seen(self, faces: NDArray[Any], places: NDArray[np.floating]) -> SeenTrials:
+        """Return as many trials as faces, in each of which these places (m, 8) were seen."""
+        tables = np.broadcast_to(gaze_table(places), (len(faces), *SHAPE))
+        counted = np.full(len(faces), len(places))
+        return SeenTrials(self._features_of(faces), tables, counted, self.chance())
+
+    def _add(self, age: int) -> None:
+        if self._count == len(self._tables) < self._capacity:
+            self._grow()
+        self._newest = (self._newest + 1) % len(self._tables)
+        self._count = min(self._count + 1, self._capacity)
+        faces, places = self._memory.trials_at(np.array([age]))
+        seen = places[0, ~np.isnan(places[0, :, 0])]
+        self._sum -= self._tables[self._newest]
+        self._tables[self._newest] = gaze_table(seen)
+        self._sum += self._tables[self._newest]
+        self._counts[self._newest] = len(seen)
+        for kept, new in zip(self._features, self._features_of(faces), strict=True):
+            kept[self._newest] = new[0]
+
+    def _chosen(self, which: slice) -> SeenTrials:
+        every = SeenTrials(self._features, self._tables, self._counts, self.chance())
+        return every.part(which)
+
+    def _grow(self) -> None:
+        rows = min(max(64, 2 * len(self._tables)), self._capacity)
+
+        def grown(array: NDArray[Any]) -> NDArray[Any]:
+            more = np.zeros((rows, *array.shape[1:]), array.dtype)
+            more[: len(array)] = array
+            return more
+
+        self._tables, self._counts = grown(self._tables), grown(self._counts)
+        self._features = Features(*map(grown, self._features))
