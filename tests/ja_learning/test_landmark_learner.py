@@ -89,7 +89,7 @@ def test_depth_helps():
     without, with_depth = (
         np.mean(
             [
-                share_right(trained(80, seed, **made), np.random.default_rng(7), 200, **made)
+                share_right(trained(40, seed, **made), np.random.default_rng(7), **made)
                 for seed in range(2)
             ]
         )

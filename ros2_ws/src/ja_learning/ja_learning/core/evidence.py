@@ -34,8 +34,14 @@ _SHARE_OF_CHANCE = 0.1
 class Evidence:
     """Faded sum of log ratios [nats], of one belief or of several side by side."""
 
-    def __init__(self, beliefs: int = 1, faces: FaceFormat = PICTURE) -> None:
-        """Start with no evidence for any of so many beliefs about faces of this format."""
+    def __init__(
+        self, beliefs: int = 1, faces: FaceFormat = PICTURE, fewest_others: int = _OTHERS
+    ) -> None:
+        """Start with no evidence for any of so many beliefs about faces of this format.
+
+        `fewest_others`: with how many faces of other trials weighing begins.
+        """
+        self._fewest_others = fewest_others
         self.nats: NDArray[np.float64] = np.zeros(beliefs)
         self._faces = faces
         self._others: list[NDArray[Any]] = []
@@ -51,9 +57,9 @@ class Evidence:
         one scale, shape (beliefs, n).
         """
         ratios = np.zeros_like(self.nats)
-        if len(self._others) == _OTHERS:
+        if len(self._others) >= self._fewest_others:
             log_p = log_probability(np.array([face, *self._others]))
-            ratio = np.exp(log_p[:, 0] - np.logaddexp.reduce(log_p, axis=1)) * (1 + _OTHERS)
+            ratio = np.exp(log_p[:, 0] - np.logaddexp.reduce(log_p, axis=1)) * log_p.shape[1]
             ratios = np.log((1 - _SHARE_OF_CHANCE) * ratio + _SHARE_OF_CHANCE)
             self.nats = self.nats * (1 - 1 / _FADES_OVER_TRIALS) + ratios
         self._others = [*self._others, face][-_OTHERS:]

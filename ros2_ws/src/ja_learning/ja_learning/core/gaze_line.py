@@ -18,6 +18,7 @@ and half of the members are re-initialised.
 """
 
 import copy
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -26,12 +27,14 @@ from numpy.typing import ArrayLike, NDArray
 from torch import nn
 
 from ja_learning.core.checkpoint_arrays import count, counts, numbers
+from ja_learning.core.eigenface_posterior import EigenfacePosterior
 from ja_learning.core.evidence import ChangeAlarm, Evidence
 from ja_learning.core.gaze_line_belief import GazeLineBelief
 from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_learning.core.gaze_line_network import GazeLineNetwork, give_member, standardised
 from ja_learning.core.gaze_line_pass import GazeLinePass
 from ja_learning.core.gaze_line_places import seen_places
+from ja_learning.core.gaze_table import level_mixture
 from ja_learning.core.replay_memory import ReplayMemory
 from ja_learning.core.trial import FACE_SHAPE, Look, Trial
 
@@ -46,6 +49,13 @@ _MOST_STEPS = 2.0**24
 _TRAINING_NEGATIVES, _WEIGHING_NEGATIVES = 64, 256
 # Augmentation of a replayed face: its size (a share), its place, its pixels (in deviations).
 _AUGMENTED_SIZE, _AUGMENTED_PLACE_PIXELS, _AUGMENTED_LIGHT = 0.1, 1.0, 0.3
+# So far soft labels of the first guess are trusted, which may be wrong.
+_GUESSED = 0.85
+# The guess about old trials becomes better with the new ones.
+_GUESSED_AGAIN_AT = (36, 72, 150, 300)
+_FEWEST_OTHERS = 4
+# By so much the first guess is more probable than an untrained network before any evidence.
+_BEFORE_EVIDENCE_NATS, _UNTRAINED_TRIALS = 6.0, 60
 _COMPARED_EVERY_TRIALS = 10
 _REPLACED_BEHIND_NATS = 15.0
 _CLEAR_NATS = 10.0
@@ -65,12 +75,16 @@ class GazeLineLearner:
         # Proposals come from the running mean of the weights, which is steadier than the last.
         self._mean = copy.deepcopy(self._network).requires_grad_(False)
         self._optimiser = _optimiser(self._network, config)
-        self._annealing = _annealing(config.members)
+        self._annealing = _annealing(config)
         # How many trials were remembered when each member started.
         self._began = np.zeros(config.members, int)
         self._memory = ReplayMemory(config.replay_memory)
-        # Of each member, and of their mixture.
-        self._evidence = Evidence(config.members + 1)
+        self._seed = seed
+        self._first_guess = self._start_first_guess()
+        # Of each candidate of the trials remembered, what the first guess makes of it.
+        self._shares: list[NDArray[np.float32]] = []
+        # Of each member, of the first guess if there is one, and of their mixture.
+        self._evidence = self._no_evidence()
         self._alarm = ChangeAlarm()
         self._steps = 0
         self._belief: GazeLineBelief | None = None
@@ -88,15 +102,7 @@ class GazeLineLearner:
     def snapshot(self) -> GazeLineBelief:
         """Return what is believed now, made when first asked for; no later update changes it."""
         if self._belief is None:
-            self._belief = GazeLineBelief(
-                lambda look: look.face,
-                GazeLinePass(self._mean),
-                self._mean.mixture().as_numpy(),
-                self._log_weights(),
-                self.log_evidence,
-                self.config.top_down,
-                self.config.plausible_within_nats,
-            )
+            self._belief = self._mixed_belief()
         return self._belief
 
     def propose(
@@ -124,6 +130,9 @@ class GazeLineLearner:
         if trial.seen_before_shift:
             changed = self._weigh(trial.face, places[: trial.seen_before_shift])
         self._memory.remember_trial(trial.face, places)
+        if self._first_guess is not None:
+            fitted = self._first_guess.add_newest()
+            self._guess_shares(of_all=fitted or self.trials in _GUESSED_AGAIN_AT)
         if changed:
             self._reinitialise(self._alarm.doubtful_trials)
         inverse_temperature = self._inverse_temperature()
@@ -132,8 +141,64 @@ class GazeLineLearner:
         if self.trials % _COMPARED_EVERY_TRIALS == 0:
             self._replace_worst_member()
 
+    def _start_first_guess(self) -> EigenfacePosterior | None:
+        if self.config.first_guess == 'none':
+            return None
+        return EigenfacePosterior(self._memory, self._seed)
+
+    def _no_evidence(self) -> Evidence:
+        if self.config.first_guess == 'none':
+            return Evidence(self.config.members + 1)
+        # The first guess knows something long before fifteen trials.
+        return Evidence(self.config.members + 2, fewest_others=_FEWEST_OTHERS)
+
+    def _mixed_belief(self) -> GazeLineBelief:
+        """Return the belief of all members, and of the first guess if there is one."""
+        answer, mixture = GazeLinePass(self._mean), self._mean.mixture().as_numpy()
+        log_weights, guess = self._log_weights(), self._first_guess
+        gaze_of: Callable[[NDArray[Any]], NDArray[np.float64]] = answer
+        if guess is not None:
+            members = log_weights[: self.config.members]
+            if guess.is_known:
+                maps, features = guess.sample(), guess.features
+
+                def both(faces: NDArray[Any]) -> NDArray[np.float64]:
+                    return np.concatenate([answer(faces), maps.gazes(features(faces))])
+
+                gaze_of = both
+
+                mixture = mixture.joined(level_mixture(maps.levels))
+                count = len(maps.levels)
+                log_weights = np.append(members, np.full(count, log_weights[-1] - np.log(count)))
+            else:
+                log_weights = members - np.logaddexp.reduce(members)
+        return GazeLineBelief(
+            lambda look: look.face,
+            gaze_of,
+            mixture,
+            log_weights,
+            self.log_evidence,
+            self.config.top_down,
+            self.config.plausible_within_nats,
+        )
+
+    def _guess_shares(self, of_all: bool) -> None:
+        """Note what the first guess makes of the candidates of the newest trial, or of all."""
+        guess = self._first_guess
+        assert guess is not None
+        known = len(self._memory)
+        ages = np.arange(known if of_all else 1)[::-1]
+        faces, places = self._memory.trials_at(ages)
+        shares = [
+            _candidate_shares(guess, face, seen[~np.isnan(seen[:, 0])])
+            for face, seen in zip(faces, places, strict=True)
+        ]
+        self._shares = (shares if of_all else [*self._shares, *shares])[-known:]
+
     def _log_weights(self) -> NDArray[np.float64]:
-        nats = self._evidence.nats[:-1]
+        nats = self._evidence.nats[:-1].copy()
+        if self._first_guess is not None:
+            nats[-1] += max(0.0, _BEFORE_EVIDENCE_NATS * (1 - self.trials / _UNTRAINED_TRIALS))
         return nats - np.logaddexp.reduce(nats)
 
     def _weigh(self, face: NDArray[np.uint8], places: NDArray[np.float32]) -> bool:
@@ -147,12 +212,23 @@ class GazeLineLearner:
                 ratio = self._mean.log_ratio(gaze, seen, negatives)
             # That one of them is the attended object; which one is not known.
             of_members = torch.logsumexp(ratio, dim=-1).numpy().astype(float)
+            if self._first_guess is not None:
+                of_members = np.vstack([of_members, self._first_guess_ratio(faces, places)])
             mixed = np.logaddexp.reduce(of_members + self._log_weights()[:, None], axis=0)
             return np.concatenate([of_members, mixed[None]])
 
         knew = self.log_evidence > _CLEAR_NATS
         log_ratio = float(self._evidence.weigh_trial(face, log_probability)[-1])
         return self._alarm.add_log_ratio(log_ratio, knew)
+
+    def _first_guess_ratio(
+        self, faces: NDArray[np.uint8], places: NDArray[np.float32]
+    ) -> NDArray[np.float64]:
+        """Return the log ratio (1, n) of the first guess on the scale of the members' ones."""
+        guess = self._first_guess
+        if guess is None or not guess.is_known:
+            return np.full((1, len(faces)), np.log(len(places)))
+        return guess.log_ratios(faces, places)[None] + np.log(len(places))
 
     def _step(self, inverse_temperature: torch.Tensor) -> None:
         members, known = self.config.members, len(self._memory)
@@ -164,6 +240,7 @@ class GazeLineLearner:
         loss = self._loss(
             self._augmented(standardised(faces)),
             torch.from_numpy(places).transpose(0, 1),
+            self._log_prior(ages, places),
             inverse_temperature,
         )
         self._optimiser.zero_grad()
@@ -210,16 +287,33 @@ class GazeLineLearner:
         places = self._memory.places_at(ages.numpy(), which.numpy())
         return torch.from_numpy(places).transpose(0, 1)
 
+    def _log_prior(self, ages: NDArray[np.int64], places: NDArray[np.float32]) -> torch.Tensor:
+        """Return the log probability of each candidate before the members see the face.
+
+        All alike, or the soft labels of the first guess; of shape (members, n, 1 or m).
+        """
+        if self._first_guess is None:
+            counts = (~np.isnan(places[..., 0])).sum(-1, keepdims=True)
+            return -torch.log(torch.from_numpy(counts)).transpose(0, 1)
+        shares: NDArray[np.float32] = np.zeros(places.shape[:-1], np.float32)
+        for row, age in zip(shares.reshape(-1, shares.shape[-1]), ages.ravel(), strict=True):
+            of_trial = self._shares[-1 - age]
+            row[: len(of_trial)] = of_trial
+        return torch.log(torch.from_numpy(shares).transpose(0, 1))
+
     def _loss(
-        self, faces: torch.Tensor, places: torch.Tensor, inverse_temperature: torch.Tensor
+        self,
+        faces: torch.Tensor,
+        places: torch.Tensor,
+        log_prior: torch.Tensor,
+        inverse_temperature: torch.Tensor,
     ) -> torch.Tensor:
         """Return minus the tempered log likelihood of one attended object, or none."""
-        counts = (~torch.isnan(places[..., 0])).sum(-1, keepdim=True)
         inverse_temperature = inverse_temperature[:, None, None]
         negatives = self._draw_negatives(_TRAINING_NEGATIVES)
         ratio = self._network.log_ratio(self._network.gaze(faces), places, negatives)
         none = self.config.none_was_meant
-        one = inverse_temperature * ratio + np.log1p(-none) - torch.log(counts)
+        one = inverse_temperature * ratio + np.log1p(-none) + log_prior
         # Without an attended object, places are distributed as the negatives: a ratio of 1.
         nothing = (inverse_temperature * np.log(none)).expand(-1, len(faces), -1)
         tempered = torch.cat([one, nothing], dim=-1)
@@ -243,8 +337,11 @@ class GazeLineLearner:
         self._evidence.nats[:] = 0.0
         members = self.config.members
         self._reinitialise_members(list(range(0, members, 2)))
-        self._annealing = _annealing(members)
+        self._annealing = _annealing(self.config)
         self._began[:] = 0
+        self._first_guess = self._start_first_guess()
+        if self._first_guess is not None:
+            self._guess_shares(of_all=True)
         self._optimiser.state.clear()
         self._steps = 0
 
@@ -268,7 +365,7 @@ class GazeLineLearner:
         that more is remembered, with the slowest annealing. If they knew something before, the
         world may have changed, which the alarm decides.
         """
-        nats = self._evidence.nats[:-1]
+        nats = self._evidence.nats[: self.config.members]
         best, worst = int(np.argmax(nats)), int(np.argmin(nats))
         if nats[best] < 0:
             if nats[worst] < -_WRONG_NATS and self._alarm.doubt == 0.0:
@@ -302,6 +399,10 @@ class GazeLineLearner:
         arrays['annealing'], arrays['began'] = self._annealing.copy(), self._began.copy()
         arrays['doubt'] = np.array(self._alarm.doubt)
         arrays['doubtful_trials'] = np.array(self._alarm.doubtful_trials)
+        if self._first_guess is not None:
+            arrays |= self._first_guess.state()
+            arrays['seed'] = np.array(self._seed)
+            arrays['candidate_shares'] = np.concatenate([np.zeros(0, np.float32), *self._shares])
         return arrays | self._memory.state() | self._evidence.state()
 
     def restore(self, arrays: dict[str, NDArray[Any]]) -> None:
@@ -316,8 +417,15 @@ class GazeLineLearner:
             for name, p in self._network.named_parameters()
         }
         memory = ReplayMemory.restored(arrays, self.config.replay_memory)
-        evidence = Evidence(members + 1)
+        evidence = self._no_evidence()
         evidence.restore(arrays)
+        seed, guess, shares = self._seed, self._first_guess, self._shares
+        if guess is not None:
+            seed = count(arrays, 'seed')
+            guess = EigenfacePosterior.restored(arrays, memory, seed)
+            seen_in = counts(arrays, 'candidate_counts')
+            flat = numbers(arrays, 'candidate_shares', (int(seen_in.sum()),), low=0.0, high=1.0)
+            shares = np.split(flat, np.cumsum(seen_in))[:-1]
         steps, trials = count(arrays, 'steps'), count(arrays, 'trials')
         doubt = float(numbers(arrays, 'doubt', (), np.float64, low=0.0))
         doubtful = count(arrays, 'doubtful_trials')
@@ -330,6 +438,7 @@ class GazeLineLearner:
         except RuntimeError as error:
             raise ValueError(f'random is no state of a generator: {error}') from None
         self._random, self._memory, self._evidence = random, memory, evidence
+        self._seed, self._first_guess, self._shares = seed, guess, shares
         self._network.load_state_dict(networks[0])
         self._mean.load_state_dict(networks[1])
         self._optimiser.state.clear()
@@ -358,8 +467,24 @@ def _optimiser(network: GazeLineNetwork, config: GazeLineConfig) -> torch.optim.
     return torch.optim.AdamW(groups, lr=config.step_size, fused=True)
 
 
-def _annealing(members: int) -> NDArray[np.float64]:
-    return np.geomspace(_FASTEST_ANNEALING, _SLOWEST_ANNEALING, members)
+def _annealing(config: GazeLineConfig) -> NDArray[np.float64]:
+    if config.first_guess != 'none':
+        # Its soft labels replace the slow search for the first ones.
+        return np.full(config.members, _FASTEST_ANNEALING)
+    return np.geomspace(_FASTEST_ANNEALING, _SLOWEST_ANNEALING, config.members)
+
+
+def _candidate_shares(
+    guess: EigenfacePosterior, face: NDArray[np.uint8], places: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Return how probable the first guess makes each of places (m, 8) the attended one, (m,)."""
+    alike = 1 / max(len(places), 1)
+    if not guess.is_known:
+        return np.full(len(places), alike, np.float32)
+    each = np.array([guess.log_ratios(face[None], place[None])[0] for place in places])
+    shares = np.exp(each - each.max(initial=-np.inf))
+    shares /= shares.sum()
+    return (_GUESSED * shares + (1 - _GUESSED) * alike).astype(np.float32)
 
 
 def _loaded(

@@ -16,6 +16,12 @@ class GazeLineConfig(Configuration):
         'below do not exist',
         choices=('pixels', 'landmarks'),
     )
+    first_guess: str = parameter(
+        'none',
+        'what reads her face until the networks can: nothing, or a linear map of the principal '
+        'components of her faces, of which the whole posterior is known (pixels only)',
+        choices=('none', 'eigenfaces'),
+    )
     members: int = parameter(6, 'networks that learn side by side', low=1, high=64)
     replay_steps: int = parameter(4, 'gradient steps a trial', low=1, high=1000)
     replay_batch: int = parameter(32, 'trials a gradient step', low=1, high=4096)

@@ -41,6 +41,25 @@ class LineMixture(Generic[Array]):
         arrays = {name: each.detach().numpy().astype(float) for name, each in vars(self).items()}
         return LineMixture(**arrays)
 
+    def joined(
+        self: 'LineMixture[NDArray[np.float64]]', other: 'LineMixture[NDArray[np.float64]]'
+    ) -> 'LineMixture[NDArray[np.float64]]':
+        """Return the members of both, whose stretches must be the same."""
+        both = (self, other)
+        counts = [len(each.log_shares) for each in both]
+
+        def members(name: str) -> NDArray[np.float64]:
+            parts = [getattr(each, name) for each in both]
+            shapes = [(n, 1, part.shape[-1]) for n, part in zip(counts, parts, strict=True)]
+            return np.concatenate(
+                [np.broadcast_to(*pair) for pair in zip(parts, shapes, strict=True)]
+            )
+
+        return LineMixture(
+            self.stretches,
+            *map(members, ('log_shares', 'origin_tilt', 'of_stretch', 'of_gaze', 'of_place')),
+        )
+
     def on_line(self, pan: Array, tilt: Array) -> tuple[Array, Array]:
         """Return o + r_k u for gazes (members, n, 1): (members, n, stretches), pan and tilt."""
         return self.stretches * pan, self.origin_tilt + self.stretches * tilt

@@ -54,11 +54,15 @@ class Maps(NamedTuple):
 
 
 class GazePosterior:
-    """A weighted cloud of maps. `prior`: deviations (k,), (l,) of the weights before any trial."""
+    """A weighted cloud of maps.
 
-    def __init__(self, prior: Features, random: np.random.Generator) -> None:
+    `prior`: deviations (k,), (l,) of the weights before any trial. `sweeps`: how often all kinds
+    of moves are made when the maps are moved; more where features are many.
+    """
+
+    def __init__(self, prior: Features, random: np.random.Generator, sweeps: int = 1) -> None:
         """Draw the maps from the prior: any direction and size of gaze."""
-        self._prior = prior
+        self._prior, self._sweeps = prior, sweeps
         self._maps = self._drawn(random, PARTICLES)
         self._log_weights = np.zeros(PARTICLES)
 
@@ -126,7 +130,7 @@ class GazePosterior:
     def _moved(self, maps: Maps, trials: SeenTrials, random: np.random.Generator) -> Maps:
         """Move maps that are distributed as the posterior, so that they stay so."""
         here = self._log_posterior(maps, trials)
-        for propose in _PROPOSALS:
+        for propose in self._sweeps * _PROPOSALS:
             proposed = propose(maps, random)
             there = self._log_posterior(proposed, trials)
             accepted = np.log(random.random(len(here))) < there - here

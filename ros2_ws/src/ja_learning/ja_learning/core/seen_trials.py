@@ -53,13 +53,6 @@ class TrialTables:
         """Add the trial that the memory has got last."""
         self._add(0)
 
-    def use_features(self, features_of: FeaturesOf) -> None:
-        """Describe all faces by other features."""
-        self._features_of = features_of
-        ages = (self._newest - np.arange(len(self._tables))) % max(len(self._tables), 1)
-        ages = np.minimum(ages, max(len(self._memory) - 1, 0))
-        self._features = features_of(self._memory.trials_at(ages)[0])
-
     def all(self) -> SeenTrials:
         """Return all of them, in any order."""
         return self._chosen(slice(0, self._count))
