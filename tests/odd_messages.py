@@ -1,8 +1,10 @@
 """Messages that a node must survive, of any type: malformed, foreign, extreme and garbled ones."""
 
 import array
+import math
 import random
 import re
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from std_msgs.msg import Float64MultiArray, Header, String
 from ja_common.camera_info_codec import encode_camera_info
 from ja_common.core.detection import Detection, Kind
 from ja_common.detection_codec import encode_detections
+from ja_common.face_gaze_codec import FIELDS as GAZE
 from ja_common.image_codec import encode_image
 from ja_common.message_types import message_class
 from ja_common.point_cloud_codec import encode_columns
@@ -132,15 +135,31 @@ def extreme(message_type: Any, header: Header, rng: random.Random) -> Any:
     if message_type is CameraInfo:
         return encode_camera_info(header, *rng.choice(SIZES), fx=rng.choice((1e-6, 300.0, 1e30)))
     if message_type is PointCloud2:
-        if rng.random() < 0.5:
-            names = ('x', 'y', 'z', 'pan', 'tilt', 'weight', 'attended', 'log_evidence')
-            count = rng.choice((0, 1, 3))
-            return encode_columns(header, {n: [number() for _ in range(count)] for n in names})
-        return encode_detections(
-            header,
-            [
-                Detection(rng.choice(list(Kind)), *(number() for _ in range(7)), track_id=i)
-                for i in range(rng.choice((0, 1, 5)))
-            ],
-        )
+        return _extreme_cloud(header, number, rng)
     return malformed(message_type, rng)
+
+
+def _extreme_cloud(header: Header, number: Callable[[], float], rng: random.Random) -> PointCloud2:
+    """Return a table, a gaze or detections as our own nodes encode them."""
+    kind = rng.choice(('table', 'gaze', 'detections'))
+    if kind == 'table':
+        names = ('x', 'y', 'z', 'pan', 'tilt', 'weight', 'attended', 'log_evidence', 'u', 'v')
+        count = rng.choice((0, 1, 3, 478))
+        return encode_columns(header, {n: [number() for _ in range(count)] for n in names})
+    if kind == 'gaze':
+        angles = (0.0, 0.3, -2.0, 1.0, 1e-30)
+        return encode_columns(header, {n: [rng.choice(angles)] for n in GAZE})
+    return encode_detections(
+        header,
+        [
+            Detection(
+                rng.choice(list(Kind)),
+                *(number() for _ in range(7)),
+                track_id=i,
+                attended=rng.random() < 0.5,
+                range_m=abs(number()) or math.nan,
+                range_deviation_m=abs(number()) or math.nan,
+            )
+            for i in range(rng.choice((0, 1, 5)))
+        ],
+    )

@@ -13,7 +13,7 @@ from typing import Any
 
 
 def main() -> None:
-    """Write down the files that the run opens: a demo in one process, or a robot without ROS."""
+    """Write down the files that the run opens: a demo in one process, or robots without ROS."""
     log = os.open(sys.argv[1], os.O_WRONLY | os.O_CREAT | os.O_APPEND)
 
     def note(event: str, arguments: tuple[Any, ...]) -> None:
@@ -27,7 +27,7 @@ def main() -> None:
         sys.argv = ['ja', 'demo', '--one-process', '--no-view', '--exam', '0', *arguments]
         runpy.run_module('ja_bringup.cli', run_name='__main__')
     else:
-        _without_ros(*arguments)
+        _without_ros(arguments)
 
 
 def _audit_opencv() -> None:
@@ -50,23 +50,19 @@ def _audit_opencv() -> None:
                 setattr(module, name, audited(found))
 
 
-def _without_ros(learner: str, face_reader: str) -> None:
-    """Render looks, and let a robot with this learner go through a few trials."""
-    from dataclasses import replace
-
+def _without_ros(learners: list[str]) -> None:
+    """Render looks, and let a robot with each of the learners go through a few trials."""
     from ja_experiments.agents.trial_loop import TrialLoop
     from ja_experiments.config import ExperimentConfig
     from ja_experiments.datasets.looks import load_looks
-    from ja_learning.core.learner_registry import LEARNERS, make_learner
+    from ja_learning.core.learner_registry import make_learner
     from ja_sim.core.scene import load_scene
 
-    config = LEARNERS[learner].config()
-    if face_reader != 'pixels':
-        config = replace(config, face_reader=face_reader)
     looks = load_looks('easy', 0, 4)
     places = load_scene('easy').objects
-    loop = TrialLoop(ExperimentConfig(), places, looks, make_learner(learner, 0, config), 0)
-    loop.run(5)
+    for learner in learners:
+        loop = TrialLoop(ExperimentConfig(), places, looks, make_learner(learner, 0), 0)
+        loop.run(5)
 
 
 if __name__ == '__main__':

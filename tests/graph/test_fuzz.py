@@ -21,7 +21,16 @@ from ja_common.graph_node import GraphNode
 from ja_common.image_codec import encode_image
 from ja_common.rclpy_private import parameter_names
 from ja_common.time_codec import to_time
-from ja_common.topics import DETECTIONS, DIAGNOSTICS, IMAGE, JOINT_STATES, SIM_TRUTH, TOPICS
+from ja_common.topics import (
+    DETECTIONS,
+    DIAGNOSTICS,
+    FACE_GAZE,
+    FACE_LANDMARKS,
+    IMAGE,
+    JOINT_STATES,
+    SIM_TRUTH,
+    TOPICS,
+)
 from ja_dashboard.core.drawings import from_above, postures
 from ja_dashboard.page import facts_html, nodes_html
 from ja_dashboard.view_node import ViewNode
@@ -36,6 +45,7 @@ PACKAGES = Path(__file__).parents[2] / 'ros2_ws' / 'src'
 PRESETS = {spec.executable: spec.parameters for spec in [*sim_graph(), *rig_graph('unused')]}
 ROUNDS, SETS_A_ROUND = 3, 25
 FEW_SETS = 8  # on all topics there are, for a node that subscribes to none or to all of them
+_SENSES = {FACE_GAZE, FACE_LANDMARKS}  # the page subscribes to what has a publisher
 ODD_VALUES = (float('nan'), -1e30, 2**62, '\x01', True, [1.0, 2.0], ['', 'x'])
 
 
@@ -86,7 +96,7 @@ class _Attack:
         topics = set(node.subscribed_topics.values())
         if isinstance(node, ViewNode):
             self.spin_until(lambda: SIM_TRUTH in node.polled_subscriptions)
-            topics |= node.polled_subscriptions.keys()
+            topics |= node.polled_subscriptions.keys() | _SENSES
         names = {topic.name for topic in topics}
         self._publishers = [
             (topic, self._speaker.create_publisher(topic.type, topic.name, topic.publisher_qos))
@@ -95,6 +105,8 @@ class _Attack:
             if topic.name in names or not names
         ]
         self.spin_until(self._is_heard)
+        if isinstance(node, ViewNode):
+            self.spin_until(lambda: node.polled_subscriptions.keys() >= _SENSES)
 
     def close(self) -> None:
         self._executor.shutdown()

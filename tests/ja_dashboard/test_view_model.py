@@ -77,6 +77,13 @@ def test_a_fixation_belongs_to_the_source_of_the_last_shift(model):
     assert facts['given up'] == '25% of 4'
 
 
+def test_each_weight_file_has_a_line_of_its_own(model):
+    assert 'weight files' not in model.facts()
+    model.weight_files = {'iris.onnx': 64 * 'b', 'face.onnx': 64 * 'a'}
+    shown = model.facts()['weight files'].splitlines()
+    assert shown == [f'face.onnx={16 * "a"}', f'iris.onnx={16 * "b"}']
+
+
 def test_the_success_rate_comes_with_its_interval(model):
     model.record_gate_status(gate('look'))
     for success in (True, True, False, False):

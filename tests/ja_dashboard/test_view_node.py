@@ -217,6 +217,25 @@ def test_the_picture_of_a_camera_on_its_side_is_shown_upright(make_bench):
     bench.wait(lambda: bench.node.frame.scene.half_view[0] == pytest.approx(half_view))
 
 
+def test_images_are_shown_beside_a_calibration_for_another_shape(bench):
+    """A rig whose camera_info is wrong shows its images, and why the rest is not to be trusted."""
+    watch(bench)
+    upright = encode_camera_info(header(0), 240, 320, FOCAL_PX)
+    stamps = []
+
+    def is_shown():
+        bench.node.note_viewer()
+        stamps.append(5_000_000_000 + len(stamps) * 10_000_000)
+        publish_image(bench, stamps[-1], instead={CAMERA_INFO: upright})
+        picture = bench.node.frame.picture
+        return picture is not None and 'camera_info' in bench.complaint()
+
+    bench.wait(is_shown)
+    assert 'the images are 320x240, but camera_info is for 240x320' in bench.complaint()
+    assert bench.node.frame.scene.half_view[0] == pytest.approx(math.radians(18)), 'assumed'
+    bench.node.frame.picture.jpeg()
+
+
 def test_a_picture_without_its_detections_waits_for_them(bench):
     watch(bench)
     head = header(7_000_000_000)

@@ -102,11 +102,11 @@ def test_looks_that_cannot_be_used_are_rendered_again_with_one_line(
 
 def test_rendered_looks_show_where_she_looks(tmp_path: Path) -> None:
     """Her face turns with the attended object, through the real world, detector and crop."""
-    found = load_looks(count=12, folder=tmp_path, report=lambda line: None)
-    again = load_looks(count=12, folder=tmp_path / 'elsewhere', report=lambda line: None)
+    found = load_looks(count=8, folder=tmp_path, report=lambda line: None)
+    again = load_looks(count=8, folder=tmp_path / 'elsewhere', report=lambda line: None)
     np.testing.assert_array_equal(found.faces, again.faces)
-    assert found.faces.shape == (12, 30, 25)
-    assert len(np.unique(found.directions, axis=0)) == 12
+    assert found.faces.shape == (8, 30, 25)
+    assert len(np.unique(found.directions, axis=0)) == 8
     # The head points at her face, 1.2 m straight ahead.
     assert np.abs(found.postures).max() < np.radians(4)
     assert np.ptp(found.directions[:, 0]) > np.radians(30)
@@ -177,7 +177,7 @@ def test_what_was_measured_survives_the_cache(tmp_path: Path, looks: Looks) -> N
 
 def test_looks_with_senses_hold_what_was_measured_and_what_is_true(tmp_path: Path) -> None:
     """Ranges are of the surfaces; her head's yaw follows the attended object."""
-    count = 16
+    count = 12
     found = load_looks(count=count, folder=tmp_path, report=lambda line: None, senses=True)
     assert len(found) == count
     assert np.isfinite(found.face_ranges).all()

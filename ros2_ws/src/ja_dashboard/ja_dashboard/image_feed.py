@@ -265,14 +265,18 @@ class ImageFeed:
         self.picture = Picture(stamp_ns, image, detections, grey, camera, latency_s, gaze)
 
     def _decoded(self, topic: Topic, decode: Callable[[Any], Any], message: Any) -> Any:
-        """Return what a message holds; None where it cannot be decoded."""
+        """Return what `decode` makes of a message; None and a problem where it raises."""
         decoded: list[Any] = []
         self._node.call_guarded(topic.name, lambda: decoded.append(decode(message)))
         return decoded[0] if decoded else None
 
     def _camera_of(self, image: NDArray[np.uint8]) -> CameraModel:
+        """Return the camera of an upright image (H, W, 3); an assumed one without a calibration.
+
+        A calibration for images of another shape is a problem, but no reason to show no image.
+        """
         height, width = image.shape[:2]
-        camera = self._camera.camera(image)
+        camera = self._decoded(CAMERA_INFO, self._camera.camera, image)
         return camera or CameraModel.from_field_of_view(width, height, _ASSUMED_VIEW_RAD)
 
 

@@ -33,7 +33,8 @@ _STYLE = """
 .ja-old { filter: grayscale(1) brightness(.45) }
 .ja-facts { display: grid; grid-template-columns: auto 1fr; gap: 2px 14px; font-size: .9rem }
 .ja-facts dt { color: #94a3b8 } .ja-facts dd { margin: 0; font-variant-numeric: tabular-nums;
-                                        min-width: 0; overflow-wrap: anywhere }
+                                        min-width: 0; overflow-wrap: anywhere;
+                                        white-space: pre-line }
 .ja-nodes { width: 100%; font-size: .82rem; border-spacing: 0 3px; border-collapse: separate }
 .ja-nodes td { vertical-align: top; padding-right: 8px; overflow-wrap: anywhere }
 .ja-light { display: inline-block; width: .7em; height: .7em; border-radius: 50% }
@@ -90,9 +91,9 @@ class _OpenPage:
             with self._card('The scene from above'):
                 self._scene = ui.html(sanitize=False).classes('w-full')
                 ui.label(
-                    'Orange: detected objects. Yellow: her face. Violet: belief of the learner. '
-                    'Green: the truth. Pink: her gaze, as read from landmarks. Without a range '
-                    'the distance is arbitrary: a camera measures directions.'
+                    'Orange: detected objects. Yellow: her face. Violet: belief of the learner, '
+                    'directions only. Green: the truth. Pink: her gaze, as read from landmarks. '
+                    'Without a range the distance is arbitrary: a camera measures directions.'
                 ).classes('ja-quiet text-xs')
             with self._card('Pan and tilt within their limits'):
                 self._postures = ui.html(sanitize=False).classes('w-full')

@@ -240,7 +240,7 @@ class ViewModel:
             'trials': self.gate.get('trials', '-'),
             'objects': self._health_value('objects'),
             'track': _short(self.track),
-            'weight files': weight_files_text(self.weight_files),
+            'weight files': weight_files_text(self.weight_files).replace(' ', '\n'),
         }
         recent = self.curve.rate(slice(-WINDOW_TRIALS, None))
         if recent.trials:
