@@ -1,12 +1,14 @@
 """What `./ja topics` shows of a graph."""
 
+import io
 import threading
 
 from rclpy.node import Node
+from rich.console import Console
 
 from ja_common.executor import CachedWaitSetExecutor
 from ja_common.topics import DETECTIONS, FIXATION, SUCCESS_RATE
-from ja_diagnostics.topics_table import measure_topics, table_of_topics
+from ja_diagnostics.topics_table import TopicRow, measure_topics, table_of_topics
 
 
 def test_a_graph_is_listed_with_rates_and_purposes(ros_context):
@@ -45,3 +47,10 @@ def test_a_graph_is_listed_with_rates_and_purposes(ros_context):
     assert success.subscribers == []
     assert '/robot/fixation' not in rows, 'no node publishes it'
     assert table_of_topics(list(rows.values())).row_count == len(rows)
+
+
+def test_a_unit_in_brackets_is_printed():
+    row = TopicRow('depth', 'Image', 'reliable', ['sim'], [], 9.5, 'distances, 16UC1 [mm]')
+    console = Console(width=200, file=io.StringIO())
+    console.print(table_of_topics([row]))
+    assert '16UC1 [mm]' in console.file.getvalue()

@@ -252,3 +252,37 @@ def test_a_calibration_that_is_refused_is_named(start, changes, reason):
     assert_no_ranges(answer(bench)[0])
     bench.wait_for_complaint(reason)
     bench.wait_for_complaint('no usable right/camera_info')
+
+
+def test_depth_of_another_frame_is_not_registered_and_gives_no_range(start):
+    bench = start()
+    send_image(bench, PERIOD_NS)
+    bench.publish(DEPTH, encode_depth(depth(), '32FC1', header(PERIOD_NS).stamp, 'depth_eye'))
+    found, _ = answer(bench)
+    assert_no_ranges(found)
+    bench.wait_for_complaint("of the frame 'depth_eye', the image of 'eye'")
+
+
+def test_depth_of_holes_alone_is_reported(start):
+    bench = start()
+    holes = np.zeros((240, 320), np.float32)
+    sent = []
+
+    def is_reported():
+        sent.append(PERIOD_NS * (len(sent) + 1))
+        send_image(bench, sent[-1])
+        bench.publish(DEPTH, encode_depth(holes, '32FC1', header(sent[-1]).stamp, 'eye'))
+        answer(bench, len(sent))
+        return 'hold no distance where things are seen' in bench.complaint()
+
+    bench.wait(is_reported)
+
+
+def test_the_same_image_again_is_no_frozen_camera(start):
+    bench = start('none', frozen_after_s=0.05)
+    send_image(bench, PERIOD_NS)
+    answer(bench)
+    for count in range(2, 12):
+        send_image(bench, PERIOD_NS)  # a paused simulation
+        answer(bench, count)
+    assert 'same' not in bench.complaint()

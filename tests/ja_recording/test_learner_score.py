@@ -74,6 +74,7 @@ def test_without_truth_there_is_an_angle_but_no_success(tmp_path):
     rows = list(csv.DictReader((tmp_path / 'a.csv').open()))
     assert [float(row['off_rad']) for row in rows] == [trial.off_rad for trial in trials]
     assert rows[0]['success'] == ''
+    assert {row['track'] for row in rows} == {'strict'}
 
 
 def test_a_recording_without_what_a_learner_needs_is_refused(tmp_path):

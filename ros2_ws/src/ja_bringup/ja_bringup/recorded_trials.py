@@ -50,7 +50,9 @@ def score(
 
 
 def _print_curve(trials: Sequence[ScoredTrial]) -> None:
-    blocks = Table(title='learner over recorded trials', title_justify='left')
+    blocks = Table(
+        title=f'learner over recorded trials, track: {trials[-1].track}', title_justify='left'
+    )
     for name in ('trials', 'off, median [deg]', 'learner succeeds', 'recorded success'):
         blocks.add_column(name)
     for first in range(0, len(trials), _BLOCK_TRIALS):

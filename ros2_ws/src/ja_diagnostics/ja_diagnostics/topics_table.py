@@ -9,6 +9,7 @@ from typing import Any
 from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rich.markup import escape
 from rich.table import Table
 
 from ja_common.core.config import ConfigError
@@ -66,7 +67,8 @@ def table_of_topics(rows: Sequence[TopicRow]) -> Table:
     for row in rows:
         rate = '?' if row.rate_hz is None else f'{row.rate_hz:.1f}'
         names = (', '.join(row.publishers), ', '.join(row.subscribers) or '-')
-        table.add_row(row.name, row.type, row.quality, *names, rate, row.purpose)
+        # A unit such as [mm] is no markup.
+        table.add_row(row.name, row.type, row.quality, *names, rate, escape(row.purpose))
     return table
 
 

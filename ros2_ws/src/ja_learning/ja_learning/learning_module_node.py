@@ -118,6 +118,11 @@ class LearningModuleNode(GraphNode):
         if self._config.realtime_priority:
             self._enable_realtime_scheduling()
 
+    @property
+    def track(self) -> str:
+        """Return the track of the learner, by what it has used so far."""
+        return str(self._learner.track)
+
     def untrained_learner(self) -> Learner:
         """Make the learner of this node, with its initial weights."""
         kind = self._choice.learner

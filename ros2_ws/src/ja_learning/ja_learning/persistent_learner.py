@@ -1,5 +1,6 @@
 """The learner of a node: it learns in a thread of its own, and is saved in checkpoints."""
 
+import math
 from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
@@ -148,7 +149,8 @@ class PersistentLearner:
 
     def _after_update(self, learner: Learner) -> None:
         """Run in the thread that learns."""
-        self._node.health.values['last error [rad]'] = f'{learner.last_error_rad:.3f}'
+        if math.isfinite(learner.last_error_rad):  # the fast learner has none
+            self._node.health.values['last error [rad]'] = f'{learner.last_error_rad:.3f}'
         # A save that failed is tried again by the clock, not after every trial.
         if self._checkpoints is not None and not self._unsaved:
             self._try(self._checkpoints.save_when_due, learner)

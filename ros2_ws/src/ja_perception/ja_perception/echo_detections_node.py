@@ -1,9 +1,12 @@
 """echo_detections: prints detections as a table."""
 
+import math
+import os
 import sys
 from collections.abc import Sequence
 from typing import Any
 
+from rclpy.executors import ExternalShutdownException
 from sensor_msgs.msg import PointCloud2
 
 from ja_common.core.detection import Detection
@@ -13,7 +16,9 @@ from ja_common.node_main import spin_node
 from ja_common.time_codec import to_ns
 from ja_common.topics import DETECTIONS
 
-_HEAD = '  kind     id       u       v   width  height  score  f_col  f_edg  f_mot  attended'
+_HEAD = (
+    '  kind     id       u       v   width  height  score  f_col  f_edg  f_mot  attended  range'
+)
 
 
 class EchoDetectionsNode(GraphNode):
@@ -24,9 +29,13 @@ class EchoDetectionsNode(GraphNode):
         self.subscribe(DETECTIONS, self._on_detections, expected_every_s=2.0)
 
     def _on_detections(self, message: PointCloud2) -> None:
-        print(
-            format_detections(to_ns(message.header.stamp), decode_detections(message)), flush=True
-        )
+        text = format_detections(to_ns(message.header.stamp), decode_detections(message))
+        try:
+            print(text, flush=True)
+        except BrokenPipeError:
+            # The reader (`| head`) has closed the pipe: Python would fail again as it ends.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise ExternalShutdownException from None
 
 
 def format_detections(stamp_ns: int, detections: list[Detection]) -> str:
@@ -39,17 +48,17 @@ def _line(d: Detection) -> str:
     return (
         f'  {d.kind.name.lower():<7}{d.track_id:>4}{d.u:>8.1f}{d.v:>8.1f}{d.width:>8.1f}'
         f'{d.height:>8.1f}{d.score:>7.2f}{d.f_col:>7.2f}{d.f_edg:>7.2f}{d.f_mot:>7.2f}'
-        f'  {"yes" if d.attended else ""}'
+        f'  {"yes" if d.attended else "":<8}{_metres(d):>7}'
     ).rstrip()
+
+
+def _metres(d: Detection) -> str:
+    return f'{d.range_m:.2f} m' if math.isfinite(d.range_m) else ''
 
 
 def main(args: Sequence[str] | None = None) -> None:
     """Run the node."""
-    try:
-        spin_node(EchoDetectionsNode, args)
-    except BrokenPipeError:
-        # The reader (`| head`) has closed the pipe.
-        sys.stderr.close()
+    spin_node(EchoDetectionsNode, args)
 
 
 if __name__ == '__main__':

@@ -68,7 +68,8 @@ class RangeInput:
         self._arrived, self._patience_s = arrived, expected_every_s
         self._buffer: StampBuffer[Image] = StampBuffer(config.depth_within_s, config.depth_wait_s)
         self._right: CameraCalibration | None = None
-        self._found_s = time.monotonic()
+        self._found_s = self._known_s = time.monotonic()
+        self._was_found = False  # depth for the newest image
         topic = DEPTH
         if config.depth == 'second_camera':
             topic = RIGHT_IMAGE
@@ -87,14 +88,16 @@ class RangeInput:
         return self.is_chosen and self._buffer.must_wait(stamp_ns, waited_s)
 
     def sensor_at(
-        self, stamp_ns: int, image: NDArray[np.uint8], camera: CameraModel
+        self, stamp_ns: int, frame_id: str, image: NDArray[np.uint8], camera: CameraModel
     ) -> RangeSensor | None:
         """Return what measured the depth of an upright image (H, W, 3) of a camera.
 
-        None where nothing usable belongs to the stamp; the cause is then reported.
+        `frame_id`: of the image, which a depth picture registered to it has, too. None where
+        nothing usable belongs to the stamp; the cause is then reported.
         """
         if not self.is_chosen:
             return None
+        self._was_found = False
         message = self._buffer.nearest(stamp_ns)
         now_s = time.monotonic()
         if message is None:
@@ -105,10 +108,11 @@ class RangeInput:
         try:
             sensor = self._decode(message, camera)
             sensor.check(image)
+            self._check_registered(message.header.frame_id, frame_id)
         except ValueError as error:
             self._report(str(error))
             return None
-        self._found_s = now_s
+        self._found_s, self._was_found = now_s, True
         self._node.health.clear_problem('depth')
         return sensor
 
@@ -125,6 +129,27 @@ class RangeInput:
         # Both cameras are mounted alike.
         picture = self._camera.decode(message)
         return SecondView(picture, focal_baseline, offset_px, turns, self._config.nearest_m)
+
+    def record_known(self, known: int, seen: int) -> None:
+        """Note how many of the detections of an image have a range, and report if none ever has.
+
+        Depth that is all holes is no error of any one image.
+        """
+        now_s = time.monotonic()
+        if known or not seen:
+            self._known_s = now_s
+        elif self._was_found and now_s - self._known_s > self._patience_s:
+            self._report('its images come, but hold no distance where things are seen')
+
+    def _check_registered(self, depth_frame: str, image_frame: str) -> None:
+        """Raise ValueError for depth that another camera has seen: its ranges would be false."""
+        if self._config.depth != 'picture' or not (depth_frame and image_frame):
+            return
+        if depth_frame != image_frame:
+            raise ValueError(
+                f'it is of the frame {depth_frame!r}, the image of {image_frame!r}: remap '
+                "depth/image_raw to depth that is registered to the image, in the image's frame"
+            )
 
     def _why_missing(self, stamp_ns: int) -> str:
         off_s = self._buffer.seconds_off(stamp_ns)

@@ -176,11 +176,11 @@ class SalientFeatureDetectorNode(GraphNode):
             self.report_problem('gaze', self._no_gaze_because, Level.WARN)
         start = time.perf_counter()
         image = self._camera.decode(message)
-        if problem := self._watch.record_picture(image, time.monotonic()):
-            self.report_problem('picture', problem, Level.WARN)
         camera = self._camera_of(image)
         if self._newest_percept is None or self._newest_percept[0] != stamp_ns:
-            depth = self._ranges.sensor_at(stamp_ns, image, camera)
+            if problem := self._watch.record_picture(image, time.monotonic()):
+                self.report_problem('picture', problem, Level.WARN)
+            depth = self._ranges.sensor_at(stamp_ns, message.header.frame_id, image, camera)
             self._newest_percept = (
                 stamp_ns,
                 self._detector.detect(image, stamp_ns, camera, posture, depth),
@@ -194,6 +194,7 @@ class SalientFeatureDetectorNode(GraphNode):
         if self._ranges.is_chosen:
             known = sum(math.isfinite(each.range_m) for each in percept.detections)
             self.health.values['detections with a range'] = f'{known} of {len(percept.detections)}'
+            self._ranges.record_known(known, len(percept.detections))
         if self._annotated_publisher.get_subscription_count():
             self._publish_annotated(header, image, percept, camera, seconds)
 

@@ -20,6 +20,7 @@ class ScoredTrial:
     `off_rad`: angle from what the learner proposed in the look at the caregiver to what was
     fixated. `success`: whether the attended object was the nearest to the proposal. `recorded`:
     whether the attended object was fixated. Both None without the truth of a simulation.
+    `track`: of the learner, as `ja_learning.core.track`.
     """
 
     trial: int
@@ -27,6 +28,7 @@ class ScoredTrial:
     off_rad: float
     success: bool | None
     recorded: bool | None
+    track: str
 
 
 def score_learner(
@@ -45,6 +47,7 @@ def score_learner(
             float(angle_between(trial.proposed, trial.trial.led_to)),
             trial.is_joint_attention(trial.proposed),
             trial.is_joint_attention(trial.trial.led_to),
+            trial.track,
         )
         for number, trial in enumerate(recorded_trials(recording, arguments, progress), 1)
     ]

@@ -34,6 +34,7 @@ from ja_common.topics import (
     SIM_TRUTH,
     Topic,
 )
+from ja_learning.core.track import Track
 from ja_learning.core.trial import Trial
 from ja_recording.core.reader import RecordedMessage, Recording
 from ja_recording.driven import DrivenNode, decoded, driven
@@ -60,7 +61,7 @@ class RecordedTrial:
     the face was last seen, and of the one on which something was fixated. `proposed`: (2,) [rad],
     where the learner would have turned from the look, before it learned from the trial. `source`:
     whose shift led to the fixation, VF or LM; None where the gate was not recorded. `truth`: at
-    the look, from a simulation; None on a rig.
+    the look, from a simulation; None on a rig. `track`: of the learner, when it had proposed.
     """
 
     trial: Trial
@@ -69,6 +70,7 @@ class RecordedTrial:
     proposed: NDArray[np.float64]
     source: str | None
     truth: TruthAt | None
+    track: str = str(Track())
 
     @property
     def attended_direction(self) -> NDArray[np.float64] | None:
@@ -222,4 +224,5 @@ class TrialExtractor:
             trial.postures[0] + look.delta,
             self._source,
             look.truth,
+            self._learner.node.track,
         )
