@@ -19,8 +19,8 @@ from ja_sim.core.scene import Scene, load_scene
 # From the base frame to her rest frame, in which x points towards the robot.
 _TO_HER_FRAME = np.array([-1.0, -1.0, 1.0])
 
-READER_ERRORS_DEG = {'gaze read at 640x480': (1.68, 1.25), 'gaze read at 320x240': (1.89, 1.38)}
-"""Errors in pan and tilt."""
+READER_ERRORS_DEG = {'gaze from landmarks': (2.9, 2.8)}
+"""Standard deviations in pan and tilt that are left of a map fitted to one person's readings."""
 
 
 def ceiling(trials: int = 8000) -> dict[str, Row]:
@@ -60,8 +60,7 @@ def ceiling_of_senses(trials: int = 4000) -> dict[str, Row]:
     """Return the success of observers that read her gaze with an error, with and without ranges.
 
     They know the geometry of the scene, the size of the error, and her distance; not how far the
-    objects are, or that with the error of a sensor. `READER_ERRORS_DEG`: of the reader of
-    landmarks (`./ja bench gaze_reading`).
+    objects are, or that with the error of a sensor.
     """
     rows: dict[str, Row] = {}
     for count in (5, 10):
