@@ -132,6 +132,9 @@ class GazeLineLearner:
         self._memory.remember_trial(trial.face, places)
         if self._first_guess is not None:
             fitted = self._first_guess.add_newest()
+            if fitted:
+                # It is another guess now: what spoke against the one before does not concern it.
+                self._evidence.nats[-2] = max(0.0, float(self._evidence.nats[-2]))
             self._guess_shares(of_all=fitted or self.trials in _GUESSED_AGAIN_AT)
         if changed:
             self._reinitialise(self._alarm.doubtful_trials)
@@ -157,6 +160,7 @@ class GazeLineLearner:
         answer, mixture = GazeLinePass(self._mean), self._mean.mixture().as_numpy()
         log_weights, guess = self._log_weights(), self._first_guess
         gaze_of: Callable[[NDArray[Any]], NDArray[np.float64]] = answer
+        surest = int(np.argmax(log_weights))
         if guess is not None:
             members = log_weights[: self.config.members]
             if guess.is_known:
@@ -172,6 +176,7 @@ class GazeLineLearner:
                 log_weights = np.append(members, np.full(count, log_weights[-1] - np.log(count)))
             else:
                 log_weights = members - np.logaddexp.reduce(members)
+                surest = int(np.argmax(members))
         return GazeLineBelief(
             lambda look: look.face,
             gaze_of,
@@ -180,6 +185,8 @@ class GazeLineLearner:
             self.log_evidence,
             self.config.top_down,
             self.config.plausible_within_nats,
+            # The weight of the first guess is shared by its maps, of which the likeliest is first.
+            surest,
         )
 
     def _guess_shares(self, of_all: bool) -> None:

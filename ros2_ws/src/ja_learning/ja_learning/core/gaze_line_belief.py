@@ -27,7 +27,8 @@ class GazeLineBelief:
     (members, n, 2) of n faces as they are read; `mixture`: the other numbers of the members, (or
     1, 1, stretches or 1). `top_down`: propose the most probable of the objects seen,
     where one is plausible; else always the best guess on the line of gaze.
-    `plausible_within_nats`: how much less probable than the best guess an object may be.
+    `plausible_within_nats`: how much less probable than the best guess an object may be. `surest`:
+    the member that makes the best guess; None: that of the largest weight.
     """
 
     def __init__(
@@ -39,9 +40,11 @@ class GazeLineBelief:
         log_evidence: float,
         top_down: bool,
         plausible_within_nats: float,
+        surest: int | None = None,
     ) -> None:
         self._log_weights = log_weights
         self._read, self._gaze_of, self._mixture = read, gaze_of, mixture
+        self._surest = int(np.argmax(log_weights)) if surest is None else surest
         self._top_down, self._plausible_within = top_down, plausible_within_nats
         self.log_evidence = log_evidence
         self._coded: _Coded | None = None
@@ -109,12 +112,11 @@ class GazeLineBelief:
                 return None
             gaze = self._gaze(face[None])
             forms = self._forms(gaze)
-            surest = int(np.argmax(self._log_weights))
-            guesses = np.stack(self._mixture.on_line(*gaze), axis=-1)[surest, 0]
+            guesses = np.stack(self._mixture.on_line(*gaze), axis=-1)[self._surest, 0]
             density = np.logaddexp.reduce(self._parts(forms, guesses), axis=(0, 3))[0]
             best = int(np.argmax(density))
             best_guess = guesses[best] * ANGLE_SCALE_RAD
-            self._coded = _Coded(look, gaze, forms, surest, best_guess, float(density[best]))
+            self._coded = _Coded(look, gaze, forms, best_guess, float(density[best]))
         return self._coded
 
     def _gaze(self, faces: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -155,7 +157,7 @@ class GazeLineBelief:
         """Return log p of the best guess, as far away as this row (8,) of places is."""
         if not known_from_eyes(place):
             return coded.log_density_there
-        guess, surest = place.copy(), coded.surest
+        guess, surest = place.copy(), self._surest
         pan, tilt = (float(each[surest, 0, 0]) for each in coded.gaze)
         origins = np.broadcast_to(self._mixture.origin_tilt, (len(self._log_weights), 1, 1))
         origin = float(origins[surest, 0, 0]) * place[HER_DISTANCE]
@@ -173,6 +175,5 @@ class _Coded:
     look: Look
     gaze: tuple[NDArray[np.float64], NDArray[np.float64]]
     forms: NDArray[np.float64]
-    surest: int
     best_guess: NDArray[np.float64]
     log_density_there: float
