@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
 
 import pytest
 
@@ -13,6 +14,15 @@ from ja_common.stop_signals import STOP_SIGNALS, StopSignals
 from ros_testing import PATIENCE_S, wait_for
 
 
+@pytest.fixture
+def heeded_hang_up() -> Iterator[None]:
+    """Let SIGHUP have its default effect, also where the tests themselves run under nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.usefixtures('heeded_hang_up')
 @pytest.mark.parametrize('number', STOP_SIGNALS)
 def test_a_signal_is_a_request_and_the_handlers_come_back(number):
     before = {n: signal.getsignal(n) for n in STOP_SIGNALS}
