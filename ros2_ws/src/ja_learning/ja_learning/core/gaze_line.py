@@ -23,13 +23,13 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from torch import nn
 
 from ja_learning.core.checkpoint_arrays import count, counts, numbers
 from ja_learning.core.eigenface_posterior import EigenfacePosterior
 from ja_learning.core.evidence import ChangeAlarm, Evidence
-from ja_learning.core.gaze_line_belief import GazeLineBelief
+from ja_learning.core.gaze_line_belief import AnswersFromSnapshot, GazeLineBelief
 from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_learning.core.gaze_line_network import GazeLineNetwork, give_member, standardised
 from ja_learning.core.gaze_line_pass import GazeLinePass
@@ -62,7 +62,7 @@ _CLEAR_NATS = 10.0
 _WRONG_NATS = 8.0
 
 
-class GazeLineLearner:
+class GazeLineLearner(AnswersFromSnapshot):
     """A learner from all that was seen in a trial, with no use for the fixation."""
 
     kind = 'gaze_line'
@@ -104,20 +104,6 @@ class GazeLineLearner:
         if self._belief is None:
             self._belief = self._mixed_belief()
         return self._belief
-
-    def propose(
-        self,
-        look: Look,
-        posture: ArrayLike,
-        candidates: ArrayLike,
-        ranges: ArrayLike | None = None,
-    ) -> NDArray[np.float64] | None:
-        """Return a change of posture (2,) [rad] towards the most probable gaze target."""
-        return self.snapshot().propose(look, posture, candidates, ranges)
-
-    def belief(self, look: Look, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-        """Draw directions (count, 2) [rad] from the belief about the gaze target."""
-        return self.snapshot().belief(look, rng, count)
 
     def update(self, trial: Trial) -> None:
         """Weigh a trial by what is believed, remember it, and replay some of those remembered."""
@@ -220,22 +206,14 @@ class GazeLineLearner:
             # That one of them is the attended object; which one is not known.
             of_members = torch.logsumexp(ratio, dim=-1).numpy().astype(float)
             if self._first_guess is not None:
-                of_members = np.vstack([of_members, self._first_guess_ratio(faces, places)])
+                guessed = _first_guess_ratio(self._first_guess, faces, places)
+                of_members = np.vstack([of_members, guessed])
             mixed = np.logaddexp.reduce(of_members + self._log_weights()[:, None], axis=0)
             return np.concatenate([of_members, mixed[None]])
 
         knew = self.log_evidence > _CLEAR_NATS
         log_ratio = float(self._evidence.weigh_trial(face, log_probability)[-1])
         return self._alarm.add_log_ratio(log_ratio, knew)
-
-    def _first_guess_ratio(
-        self, faces: NDArray[np.uint8], places: NDArray[np.float32]
-    ) -> NDArray[np.float64]:
-        """Return the log ratio (1, n) of the first guess on the scale of the members' ones."""
-        guess = self._first_guess
-        if guess is None or not guess.is_known:
-            return np.full((1, len(faces)), np.log(len(places)))
-        return guess.log_ratios(faces, places)[None] + np.log(len(places))
 
     def _step(self, inverse_temperature: torch.Tensor) -> None:
         members, known = self.config.members, len(self._memory)
@@ -479,6 +457,15 @@ def _annealing(config: GazeLineConfig) -> NDArray[np.float64]:
         # Its soft labels replace the slow search for the first ones.
         return np.full(config.members, _FASTEST_ANNEALING)
     return np.geomspace(_FASTEST_ANNEALING, _SLOWEST_ANNEALING, config.members)
+
+
+def _first_guess_ratio(
+    guess: EigenfacePosterior, faces: NDArray[np.uint8], places: NDArray[np.float32]
+) -> NDArray[np.float64]:
+    """Return the log ratio (n,) of the first guess on the scale of the members' ones."""
+    if not guess.is_known:
+        return np.full(len(faces), np.log(len(places)))
+    return guess.log_ratios(faces, places) + np.log(len(places))
 
 
 def _candidate_shares(

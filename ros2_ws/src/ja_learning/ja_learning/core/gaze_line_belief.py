@@ -165,6 +165,28 @@ class GazeLineBelief:
         return float(self._mixed(coded, guess[None])[0, 0])
 
 
+class AnswersFromSnapshot:
+    """A learner that answers with what it believes now, its snapshot."""
+
+    def snapshot(self) -> GazeLineBelief:
+        """Return what is believed now; no later update changes it."""
+        raise NotImplementedError
+
+    def propose(
+        self,
+        look: Look,
+        posture: ArrayLike,
+        candidates: ArrayLike,
+        ranges: ArrayLike | None = None,
+    ) -> NDArray[np.float64] | None:
+        """Return a change of posture (2,) [rad] towards the most probable gaze target."""
+        return self.snapshot().propose(look, posture, candidates, ranges)
+
+    def belief(self, look: Look, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+        """Draw directions (count, 2) [rad] from the belief about the gaze target."""
+        return self.snapshot().belief(look, rng, count)
+
+
 @dataclass(frozen=True)
 class _Coded:
     """One face, coded: its gazes, pan and tilt, and their forms.

@@ -20,6 +20,9 @@ from numpy.typing import NDArray
 
 Array = TypeVar('Array', torch.Tensor, NDArray[np.float64])
 
+FIRST_STRETCH, LAST_STRETCH, STRETCH_COUNT = 0.35, 2.2, 9
+"""The stretches r_k of all members, in equal steps of their logarithm."""
+
 
 @dataclass(frozen=True)
 class LineMixture(Generic[Array]):

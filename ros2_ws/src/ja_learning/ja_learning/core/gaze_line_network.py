@@ -16,11 +16,17 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
-from ja_learning.core.gaze_line_mixture import LineMixture, powers
+from ja_learning.core.gaze_line_mixture import (
+    FIRST_STRETCH,
+    LAST_STRETCH,
+    STRETCH_COUNT,
+    LineMixture,
+    powers,
+)
 from ja_learning.core.gaze_line_places import COVARIANCE, FROM_EYES, HER_DISTANCE, IN_VIEW
 from ja_learning.core.trial import FACE_SHAPE
 
-STRETCHES = torch.exp(torch.linspace(np.log(0.35), np.log(2.2), 9))
+STRETCHES = torch.exp(torch.linspace(np.log(FIRST_STRETCH), np.log(LAST_STRETCH), STRETCH_COUNT))
 _HIDDEN = 64
 # Of the pixels, 0-255, of a face that is not to be blown up.
 LEAST_VARIANCE = 0.06

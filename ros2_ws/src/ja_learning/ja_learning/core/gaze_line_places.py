@@ -8,11 +8,11 @@ distances are known, the six of `directions_from_eyes`, else NaN. Angles are in 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ja_learning.core.directions_from_eyes import directions_from_eyes
+from ja_learning.core.directions_from_eyes import COLUMNS, directions_from_eyes
 from ja_learning.core.trial import Look
 
 ANGLE_SCALE_RAD = float(np.radians(40))
-PLACE_COLUMNS = 8
+PLACE_COLUMNS = 2 + COLUMNS
 IN_VIEW, FROM_EYES, HER_DISTANCE, COVARIANCE = slice(0, 2), slice(2, 4), 4, slice(5, 8)
 """The columns: see above."""
 

@@ -18,12 +18,17 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ja_learning.core.compiled import compiled
-from ja_learning.core.gaze_line_mixture import LineMixture
+from ja_learning.core.gaze_line_mixture import (
+    FIRST_STRETCH,
+    LAST_STRETCH,
+    STRETCH_COUNT,
+    LineMixture,
+)
 
 PAN_MOST, TILT_MOST, STEP = 2.4, 1.2, 0.06
 """The table reaches from minus to plus these gazes, in units of `ANGLE_SCALE_RAD`."""
 
-_STRETCHES = np.exp(np.linspace(math.log(0.35), math.log(2.2), 9))
+_STRETCHES = np.exp(np.linspace(math.log(FIRST_STRETCH), math.log(LAST_STRETCH), STRETCH_COUNT))
 _OF_STRETCH = 0.12
 _UNIT = 2.0**-20
 

@@ -8,11 +8,11 @@ eyes come from foreign weights, so that what is left to learn - what they mean f
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ja_learning.core.checkpoint_arrays import count, numbers
 from ja_learning.core.evidence import ChangeAlarm, Evidence
-from ja_learning.core.gaze_line_belief import GazeLineBelief
+from ja_learning.core.gaze_line_belief import AnswersFromSnapshot, GazeLineBelief
 from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_learning.core.gaze_line_places import seen_places
 from ja_learning.core.gaze_posterior import GazePosterior
@@ -31,7 +31,7 @@ _CLEAR_NATS = 10.0
 _PRIOR, _MOVES, _SAMPLES, _CHANGE = range(4)
 
 
-class LandmarkLearner:
+class LandmarkLearner(AnswersFromSnapshot):
     """The posterior over maps from landmarks to gazes, trial by trial."""
 
     kind = 'gaze_line'
@@ -69,20 +69,6 @@ class LandmarkLearner:
                 self.config.plausible_within_nats,
             )
         return self._belief
-
-    def propose(
-        self,
-        look: Look,
-        posture: ArrayLike,
-        candidates: ArrayLike,
-        ranges: ArrayLike | None = None,
-    ) -> NDArray[np.float64] | None:
-        """Return a change of posture (2,) [rad] towards the most probable gaze target."""
-        return self.snapshot().propose(look, posture, candidates, ranges)
-
-    def belief(self, look: Look, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-        """Draw directions (count, 2) [rad] from the belief about the gaze target."""
-        return self.snapshot().belief(look, rng, count)
 
     def update(self, trial: Trial) -> None:
         """Weigh the maps by a trial; resample and move them where few carry the weight."""
