@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from ja_common.core.statistics import over_seeds
-from ja_experiments.config import reading
+from ja_experiments.config import READINGS, reading
 from ja_experiments.datasets.looks import Looks
 from ja_experiments.paper.experiment import BLOCKS, Materials, Plan, run_conditions
 from ja_experiments.paper.report import write_report
@@ -71,7 +71,10 @@ def test_every_ablation_changes_something() -> None:
 
 def test_a_study_becomes_a_report(tmp_path: Path, materials: Materials) -> None:
     config = StudyConfig(
-        plan=Plan(trials=3000, seeds=(0, 1), test_trials=200), episodes=3, ablation_seeds=1
+        plan=Plan(trials=3000, seeds=(0, 1), test_trials=200),
+        values='chosen',
+        episodes=3,
+        ablation_seeds=1,
     )
     path = write_report(run_study(config, ProgressBars(), materials), tmp_path / 'report')
 
@@ -92,6 +95,11 @@ def test_a_study_becomes_a_report(tmp_path: Path, materials: Materials) -> None:
     assert np.array(curve).shape == (2, BLOCKS)
     kept = yaml.safe_load((path.parent / 'config.yaml').read_text())
     assert kept['study']['plan']['seeds'] == [0, 1]
+    assert 'are the *chosen* ones' in text
+    for name in READINGS:
+        chosen = reading(name, 'chosen').network
+        assert kept['readings'][name]['initial_weight'] == chosen.initial_weight
+        assert chosen != reading(name).network, 'the default is another set of values'
     shipped = (files('ja_perception.models') / 'blazeface_short_range.onnx').read_bytes()
     digest = hashlib.sha256(shipped).hexdigest()
     for named in (kept, numbers):

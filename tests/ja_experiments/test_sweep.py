@@ -4,15 +4,20 @@ import multiprocessing
 import os
 import signal
 import time
+from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pyarrow.parquet
 import pytest
 from distributed import LocalCluster
 
 from ja_common.core.config import ConfigError
+from ja_experiments.config import READINGS, VALUES, reading
 from ja_experiments.datasets.looks import Looks
-from ja_experiments.paper.experiment import Materials
+from ja_experiments.paper.choice import rank_candidates
+from ja_experiments.paper.experiment import BLOCKS, Materials
 from ja_experiments.progress_bars import ProgressBars
 from ja_experiments.sweep import _key as cell_key
 from ja_experiments.sweep import run_cell, run_sweep
@@ -70,6 +75,8 @@ def test_a_grid_is_every_combination_with_every_seed(tmp_path: Path) -> None:
         ('gird: {}', 'and nothing else'),
         ('reading: first', 'one of all, last'),
         ('reading: [all]', 'reading'),
+        ('values: best', 'one of first, chosen'),
+        ('looks_seed: -1', 'looks_seed = -1 is outside'),
         ('grid: {', 'not YAML'),
         ('- 1', 'a table of settings'),
         ('seeds: null', 'nor a list of seeds'),
@@ -199,3 +206,40 @@ def test_only_missing_cells_are_run_and_other_looks_are_other_cells(
         assert len(cell_files(tmp_path)) == 4 + 2
     # All cells are there: no scheduler is contacted.
     run_sweep(larger, materials, tmp_path, ProgressBars(), scheduler='tcp://nowhere.invalid:1')
+
+
+def rows_of_curve(learning_rate: float, start: float, rises_at: int, end: float) -> list[Any]:
+    """Return rows of a sweep whose runs rise once, with two seeds and 1 and 10 objects."""
+    curve = np.where(np.arange(BLOCKS) < rises_at, start, end)
+    return [
+        {
+            'objects': objects, 'seed': seed, 'pairs': 'all', 'learning_rate': learning_rate,
+            'online_end': end + shift, 'online_by_block': (curve + shift).tolist(),
+        }
+        for objects in (1, 10)
+        for seed, shift in ((0, -0.01), (1, 0.01))
+    ]  # fmt: skip
+
+
+def test_the_best_end_is_chosen_among_the_curves_of_the_papers_shape() -> None:
+    rows = [
+        *rows_of_curve(0.1, start=0.1, rises_at=12, end=0.7),
+        *rows_of_curve(0.2, start=0.1, rises_at=12, end=0.8),
+        *rows_of_curve(0.3, start=0.3, rises_at=12, end=0.9),  # not at chance with 10 objects
+        *rows_of_curve(0.4, start=0.1, rises_at=2, end=0.95),  # it rises within stage I
+    ]
+    ranked = rank_candidates(rows)
+    assert [candidate.settings for candidate in ranked] == [
+        {'learning_rate': rate} for rate in (0.2, 0.1, 0.4, 0.3)
+    ]
+    assert [candidate.has_shape_of_paper for candidate in ranked] == [True, True, False, False]
+    assert ranked[0].ends == pytest.approx({1: 0.8, 10: 0.8})
+    assert ranked[0].success == pytest.approx(0.8)
+
+
+@pytest.mark.parametrize('name', READINGS)
+def test_the_chosen_and_the_first_values_are_candidates_of_the_shipped_sweep(name: str) -> None:
+    grid = read_grid(Path(str(files('ja_experiments.paper') / f'choice_{name}.yaml')))
+    candidates = [cell.config().with_settings({'objects': 5}) for cell in grid.cells]
+    for values in VALUES:
+        assert reading(name, values).with_settings({'objects': 5}) in candidates, values

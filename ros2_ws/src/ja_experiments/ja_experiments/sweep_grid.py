@@ -1,9 +1,11 @@
 """What a sweep consists of: its cells, read from a YAML file.
 
-reading: last           # 'all' or 'last' pairs; where the grid starts from
+reading: last           # 'all' or 'last' pairs, and
+values: first           # 'first' or 'chosen' values: where the grid starts from
 trials: 300000
 seeds: 5                # or a list
 scene: default
+looks_seed: 0           # seed of the caregiver
 grid:                   # any parameter of the experiment, by its name
   objects: [1, 5, 10]
   learning_rate: [0.003, 0.01]
@@ -19,7 +21,7 @@ from typing import Any
 
 from ja_common.core.config import ConfigError, Configuration, parameter
 from ja_common.core.safe_files import load_yaml
-from ja_experiments.config import READINGS, ExperimentConfig, reading
+from ja_experiments.config import READINGS, VALUES, ExperimentConfig, reading
 
 MOST_CELLS = 100_000
 _LARGEST_SEED = 2**32 - 1
@@ -30,8 +32,12 @@ class SweepConfig(Configuration):
     """What all cells of a sweep share."""
 
     reading: str = parameter('all', 'where the grid starts from', choices=tuple(READINGS))
+    values: str = parameter(
+        'first', 'values of the reading that the grid starts from', choices=tuple(VALUES)
+    )
     trials: int = parameter(300_000, 'trials of each run', low=3000, high=10**9)
     scene: str = parameter('default', 'scene of the looks, by name or file')
+    looks_seed: int = parameter(0, 'seed of the caregiver', low=0, high=_LARGEST_SEED)
 
 
 @dataclass(frozen=True)
@@ -39,20 +45,22 @@ class Cell:
     """One run of a sweep: its changes to the reading, and its seed."""
 
     reading: str
+    values: str
     trials: int
     settings: dict[str, Any]
     seed: int
 
     def config(self) -> ExperimentConfig:
         """Return the configuration of the run."""
-        return reading(self.reading).with_settings(self.settings)
+        return reading(self.reading, self.values).with_settings(self.settings)
 
 
 @dataclass(frozen=True)
 class Grid:
-    """A sweep: its cells, and the scene of the looks that all of them learn from."""
+    """A sweep: its cells, and the scene and seed of the looks that all of them learn from."""
 
     scene: str
+    looks_seed: int
     cells: tuple[Cell, ...]
 
 
@@ -82,10 +90,12 @@ def _grid(table: dict[str, Any]) -> Grid:
     cells = []
     for chosen in itertools.product(*axes.values()):
         settings = dict(zip(axes, chosen, strict=True))
-        of_one = [Cell(config.reading, config.trials, settings, seed) for seed in seeds]
+        of_one = [
+            Cell(config.reading, config.values, config.trials, settings, seed) for seed in seeds
+        ]
         of_one[0].config()  # the parameters and their ranges are checked here
         cells += of_one
-    return Grid(config.scene, tuple(cells))
+    return Grid(config.scene, config.looks_seed, tuple(cells))
 
 
 def _seeds(given: Any) -> list[int]:

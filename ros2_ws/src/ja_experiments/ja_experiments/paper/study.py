@@ -31,13 +31,15 @@ FEATURED_OBJECTS = 5
 class StudyConfig:
     """What to compute. No ablations when `ablation_seeds` is 0.
 
-    `looks_seed`: seed of the caregiver. `data`: folder of a recorded data set, in place of a
-    rendered caregiver; then there is no Figure 7, because the world around her is not known.
+    `values`: one of the `VALUES`. `looks_seed`: seed of the caregiver. `data`: folder of a
+    recorded data set, in place of a rendered caregiver; then there is no Figure 7, because the
+    world around her is not known.
     `pool`: looks of the data to learn from; 0: as many as the paper, or four fifths of them.
     `episodes`: number of trials for Figure 7.
     """
 
     plan: Plan = field(default_factory=Plan)
+    values: str = 'first'
     scene: str = 'default'
     looks_seed: int = 0
     data: str = ''
@@ -128,7 +130,7 @@ def prepare_materials(scene: str, looks_seed: int, progress: ProgressBars) -> Ma
 def _figure_6(
     name: str, config: StudyConfig, materials: Materials, progress: ProgressBars
 ) -> dict[int, Condition]:
-    configs = {str(n): reading(name).with_settings({'objects': n}) for n in OBJECTS}
+    configs = {str(n): reading(name, config.values).with_settings({'objects': n}) for n in OBJECTS}
     with progress.bar(f'figure 6, pairs: {name}', _trials(configs, config.plan)) as advance:
         found = run_conditions(configs, config.plan, materials, config.workers, advance)
     return {n: found[str(n)] for n in OBJECTS}
@@ -151,7 +153,7 @@ def _figure_7(
 def _ablations(
     name: str, config: StudyConfig, materials: Materials, progress: ProgressBars
 ) -> dict[str, Condition]:
-    base = reading(name).with_settings({'objects': FEATURED_OBJECTS})
+    base = reading(name, config.values).with_settings({'objects': FEATURED_OBJECTS})
     configs = {label: base.with_settings(changed) for label, changed in read_ablations().items()}
     plan = replace(config.plan, seeds=config.plan.seeds[: config.ablation_seeds])
     with progress.bar(f'ablations, pairs: {name}', _trials(configs, plan)) as advance:
