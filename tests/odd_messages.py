@@ -144,6 +144,7 @@ def _extreme_cloud(header: Header, number: Callable[[], float], rng: random.Rand
     kind = rng.choice(('table', 'gaze', 'detections'))
     if kind == 'table':
         names = ('x', 'y', 'z', 'pan', 'tilt', 'weight', 'attended', 'log_evidence', 'u', 'v')
+        names += ('expected_gain',) * (rng.random() < 0.5)
         count = rng.choice((0, 1, 3, 478))
         return encode_columns(header, {n: [number() for _ in range(count)] for n in names})
     if kind == 'gaze':

@@ -53,21 +53,22 @@ class Graph:
         self.pan = 0.0
         bench.wait(lambda: bench.peer.count_subscribers('/clock'))
 
-    def publish_proposals(self, proposals, stamp_ns=None, without=(), log_evidence=0.0):
+    def publish_proposals(self, proposals, stamp_ns=None, without=(), **evidence):
         """Publish all topics of one image; those not in `proposals` carry no proposal."""
         stamp_ns = self.stamp_ns if stamp_ns is None else stamp_ns
-        evidence = {'log_evidence': [log_evidence]}
-        self.bench.publish(EVIDENCE, encode_columns(header(stamp_ns), evidence))
+        evidence = {'log_evidence': 0.0, **evidence}
+        columns = {name: [value] for name, value in evidence.items()}
+        self.bench.publish(EVIDENCE, encode_columns(header(stamp_ns), columns))
         for topic in PROPOSALS:
             if topic not in without:
                 self.bench.publish(topic, joint_state(stamp_ns, *proposals.get(topic, ())))
 
-    def image(self, proposals=FACE_RIGHT, age_s=0.0, follow=True):
+    def image(self, proposals=FACE_RIGHT, age_s=0.0, follow=True, **evidence):
         """Publish the next image; return its command, which the head follows at once."""
         self.stamp_ns += PERIOD_NS
         self.set_clock(self.stamp_ns + int(age_s * 1e9))
         self.bench.publish_posture(self.stamp_ns, self.pan)
-        self.publish_proposals(proposals)
+        self.publish_proposals(proposals, **evidence)
         command = self.answer()
         if follow:
             self.pan = command.position[0]
@@ -458,6 +459,35 @@ def test_a_head_on_a_robot_that_publishes_each_joint_in_a_message_of_its_own(gra
         graph.pan = commands[-1].position[0]
     assert [command.position[0] for command in commands] == pytest.approx([0.0, -0.2, -0.4])
     assert graph.bench.complaint() == 'OK'
+
+
+@pytest.mark.parametrize(
+    ('evidence', 'p_lm'),
+    [
+        ({'expected_gain': 1.0}, 1.0),
+        ({'expected_gain': 0.0}, 0.0474),
+        ({'expected_gain': math.nan}, 0.0474),
+        ({}, 0.0474),  # as recordings before there was a gain
+        ({'expected_gain': math.nan, 'log_evidence': 30.0}, 1.0),
+        ({'expected_gain': 1.0, 'log_evidence': -30.0}, 0.0474),
+    ],
+)
+def test_the_gate_by_expected_gain_follows_what_the_learner_publishes(make_graph, evidence, p_lm):
+    graph = make_graph(gating='expected_gain')
+    for _ in range(2):
+        graph.image(**evidence)
+    assert float(graph.status()[1]['p_lm']) == pytest.approx(p_lm, abs=1e-3)
+
+
+@pytest.mark.parametrize('gain', [-0.1, 1.5, math.inf])
+def test_a_gain_that_is_none_is_reported_and_the_next_image_is_answered(make_graph, gain):
+    graph = make_graph(gating='expected_gain')
+    graph.image()
+    graph.stamp_ns += PERIOD_NS
+    graph.bench.publish_posture(graph.stamp_ns, graph.pan)
+    graph.publish_proposals(FACE_RIGHT, expected_gain=gain)
+    graph.image(expected_gain=1.0)
+    assert 'expected_gain must be one number from 0 to 1' in graph.bench.complaint()
 
 
 RATE_HZ = 50.0  # of the commands; slow enough for a busy machine

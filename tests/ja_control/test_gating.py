@@ -40,3 +40,29 @@ def test_evidence_opens_the_gate_and_closes_it_again():
     assert gating.p_lm(0, 40.0) == pytest.approx(0.9), 'trials do not count'
     assert gating.p_lm(10**6, 0.0) == pytest.approx(0.9 / (1 + math.exp(3)))
     assert gating.p_lm(10**6, -1e6) == 0.0
+
+
+def test_the_gate_follows_the_gain_that_can_be_expected():
+    gating = Gating(GatingConfig(gating='expected_gain'))
+    assert gating.p_lm(0, 0.0, 0.0) < 0.06, 'a learner that expects none is not asked'
+    gains = [gating.p_lm(0, 0.0, gain / 20) for gain in range(21)]
+    assert gains == sorted(gains)
+    assert gains[-1] > 0.99
+    assert gating.p_lm(10**6, 0.0, 0.4) == gating.p_lm(0, 0.0, 0.4), 'trials do not count'
+
+
+def test_evidence_against_the_learner_lowers_the_gain_that_is_expected():
+    gating = Gating(GatingConfig(gating='expected_gain', belief_prior_nats=2.0))
+    sure = [gating.p_lm(0, nats, 1.0) for nats in (5.0, -2.0, -4.0, -20.0)]
+    assert sure == sorted(sure, reverse=True)
+    assert sure[1] > 0.99, 'half of a sure gain is worth asking'
+    assert sure[2] < 0.5
+    assert sure[3] < 0.05
+    assert gating.p_lm(0, -1e6, 1.0) == pytest.approx(gating.p_lm(0, 0.0, 0.0))
+
+
+def test_a_learner_that_expects_nothing_is_asked_by_the_evidence():
+    by_gain = Gating(GatingConfig(gating='expected_gain', evidence_centre_nats=3.0))
+    by_evidence = Gating(GatingConfig(gating='evidence', evidence_centre_nats=3.0))
+    for nats in (-5.0, 3.0, 8.0):
+        assert by_gain.p_lm(0, nats, math.nan) == by_evidence.p_lm(0, nats)

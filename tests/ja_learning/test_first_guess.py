@@ -5,12 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
+from ja_learning.core.contrast_memory import ContrastMemory
 from ja_learning.core.eigenface_posterior import EigenfacePosterior
 from ja_learning.core.eigenfaces import COMPONENTS, Eigenfaces
 from ja_learning.core.gaze_line import GazeLineLearner
 from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_learning.core.gaze_line_places import ANGLE_SCALE_RAD, seen_places
-from ja_learning.core.replay_memory import ReplayMemory
+from ja_learning.core.mean_face import contrast, standardised
 from ja_learning.core.trial import Look, Trial
 
 LOOK = np.array([0.1, -0.05])
@@ -35,13 +36,14 @@ def made_trial(rng: np.random.Generator, objects: int = 4) -> tuple[Trial, int]:
 
 def test_components_are_odd_or_even_in_a_mirror_and_of_the_same_size():
     rng = np.random.default_rng(0)
-    faces = np.array([made_trial(rng)[0].face for _ in range(40)])
+    faces = np.array([contrast(made_trial(rng)[0].look) for _ in range(40)])
     found = Eigenfaces(faces)
     seen = found.features(faces)
     mirrored = found.features(np.ascontiguousarray(faces[:, :, ::-1]))
-    np.testing.assert_allclose(mirrored.pan, -seen.pan, atol=1e-9)
+    np.testing.assert_allclose(mirrored.pan[:, :-1], -seen.pan[:, :-1], atol=1e-9)
     np.testing.assert_allclose(mirrored.tilt, seen.tilt, atol=1e-9)
-    assert seen.pan.shape == (40, COMPONENTS)
+    assert seen.pan.shape == seen.tilt.shape == (40, COMPONENTS + 1)
+    assert (seen.pan[:, -1] == 1).all()
     assert (seen.tilt[:, -1] == 1).all()
     assert np.sqrt((seen.pan[:, 0] ** 2).mean()) == pytest.approx(1.0)
 
@@ -49,30 +51,30 @@ def test_components_are_odd_or_even_in_a_mirror_and_of_the_same_size():
 @pytest.mark.parametrize('faces', [1, 2, 3])
 def test_few_faces_have_few_components(faces: int):
     rng = np.random.default_rng(0)
-    pictures = np.array([made_trial(rng)[0].face for _ in range(faces)])
+    pictures = np.array([contrast(made_trial(rng)[0].look) for _ in range(faces)])
     features = Eigenfaces(pictures).features(pictures)
     assert np.isfinite(features.pan).all()
     assert np.isfinite(features.tilt).all()
 
 
 def test_faces_without_any_contrast_are_no_error():
-    flat = np.full((4, 30, 25), 9, np.uint8)
-    assert not Eigenfaces(flat).features(flat).pan.any()
+    flat = standardised(np.full((4, 30, 25), 9, np.uint8))
+    assert not Eigenfaces(flat).features(flat).pan[:, :-1].any()
 
 
 def test_the_posterior_knows_the_attended_object_after_a_few_trials():
-    rng, memory = np.random.default_rng(3), ReplayMemory(100)
-    guess = EigenfacePosterior(memory, 0)
+    rng, memory = np.random.default_rng(3), ContrastMemory(100)
+    guess = EigenfacePosterior(memory, 0, 0)
     assert not guess.is_known
     for _ in range(20):
         trial, _ = made_trial(rng)
-        memory.remember_trial(trial.face, seen_places(trial.look, trial.candidates))
+        memory.remember(trial, seen_places(trial.look, trial.candidates))
         guess.add_newest()
     right = 0
     for _ in range(60):
         trial, attended = made_trial(rng)
         places = seen_places(trial.look, trial.candidates)
-        ratios = [guess.log_ratios(trial.face[None], place[None])[0] for place in places]
+        ratios = [guess.log_ratios(contrast(trial.look)[None], place[None])[0] for place in places]
         right += int(np.argmax(ratios)) == attended
     assert right > 45
 
@@ -91,7 +93,7 @@ def test_with_a_first_guess_the_fast_learner_needs_a_dozen_trials():
     def trained(first_guess: str) -> float:
         config = GazeLineConfig(members=3, channels=4, first_guess=first_guess)
         learner, rng = GazeLineLearner(config, 3), np.random.default_rng(1)
-        for _ in range(14):
+        for _ in range(8):
             learner.update(made_trial(rng)[0])
         return share_right(learner, np.random.default_rng(9))
 
@@ -105,11 +107,11 @@ def test_its_belief_joins_the_networks_and_the_maps():
     for _ in range(10):
         learner.update(made_trial(rng)[0])
     look = Look(drawn_face(np.array([0.3, 0.1])), LOOK)
-    density = learner.snapshot().log_density(look.face[None], LOOK, (LOOK + 0.1)[None])
+    density = learner.snapshot().log_density(contrast(look)[None], LOOK, (LOOK + 0.1)[None])
     assert np.isfinite(density).all()
     grid = np.linspace(-4, 4, 101) * ANGLE_SCALE_RAD
     places = np.stack(np.meshgrid(grid, grid, indexing='ij'), -1).reshape(-1, 2)
-    total = np.exp(learner.snapshot().log_density(look.face[None], LOOK, LOOK + places)).sum()
+    total = np.exp(learner.snapshot().log_density(contrast(look)[None], LOOK, LOOK + places)).sum()
     assert total * (0.08 * ANGLE_SCALE_RAD) ** 2 == pytest.approx(1.0, abs=0.03)
     assert learner.belief(look, rng, 50).shape == (50, 2)
 

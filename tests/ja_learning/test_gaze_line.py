@@ -9,14 +9,11 @@ import torch
 from ja_learning.core.gaze_line import GazeLineLearner
 from ja_learning.core.gaze_line_belief import GazeLineBelief
 from ja_learning.core.gaze_line_config import GazeLineConfig
-from ja_learning.core.gaze_line_network import (
-    GazeLineNetwork,
-    give_member,
-    standardised,
-)
+from ja_learning.core.gaze_line_network import GazeLineNetwork, give_member
 from ja_learning.core.gaze_line_pass import GazeLinePass
 from ja_learning.core.gaze_line_places import ANGLE_SCALE_RAD
 from ja_learning.core.learner_registry import make_learner
+from ja_learning.core.mean_face import contrast, standardised
 from ja_learning.core.trial import Look, Trial
 
 LOOK = np.array([0.1, -0.05])
@@ -59,7 +56,7 @@ def share_right(learner: GazeLineLearner, rng: np.random.Generator, trials: int 
 
 @pytest.fixture
 def learner() -> GazeLineLearner:
-    return GazeLineLearner(GazeLineConfig(members=3, channels=4), seed=3)
+    return GazeLineLearner(GazeLineConfig(members=3, channels=4, first_guess='none'), seed=3)
 
 
 def test_a_mirrored_face_gives_mirrored_pan_and_equal_tilt():
@@ -133,9 +130,12 @@ def test_samples_of_the_belief_are_as_its_density_says(learner):
     # E[-log p] of a density's own samples is its entropy: the same from two independent halves,
     # and lower than that of the samples moved aside.
     halves = np.split(samples, 2)
-    entropy = [-learner.snapshot().log_density(face[None], LOOK, half).mean() for half in halves]
+    entropy = [
+        -learner.snapshot().log_density(standardised(face)[None], LOOK, half).mean()
+        for half in halves
+    ]
     assert entropy[0] == pytest.approx(entropy[1], abs=0.1)
-    aside = learner.snapshot().log_density(face[None], LOOK, samples + 0.1)
+    aside = learner.snapshot().log_density(standardised(face)[None], LOOK, samples + 0.1)
     assert -aside.mean() > np.mean(entropy) + 0.3
 
 
@@ -152,10 +152,10 @@ def test_depth_is_uncertain_along_the_line_of_gaze_and_not_across():
 def test_the_compiled_pass_gives_the_gazes_of_the_network(members, channels):
     torch.manual_seed(0)
     network = GazeLineNetwork(members, channels)
-    faces = np.random.default_rng(0).integers(0, 256, (4, 30, 25)).astype(np.uint8)
-    faces[3] = 7  # nothing to be seen in it
+    faces = np.random.default_rng(0).normal(size=(4, 30, 25)).astype(np.float32)
+    faces[3] = 0  # nothing to be seen in it
     with torch.no_grad():
-        gaze = network.gaze(standardised(faces[:, None])).numpy()
+        gaze = network.gaze(torch.from_numpy(faces[:, None])).numpy()
     compiled = GazeLinePass(network)
     assert compiled(faces) == pytest.approx(gaze, abs=1e-6)
     assert np.ptp(gaze[:, :3], axis=1).min() > 1e-3
@@ -168,18 +168,18 @@ def test_the_compiled_pass_gives_the_gazes_of_the_network(members, channels):
 def test_the_belief_in_numpy_equals_the_network_in_torch():
     network = GazeLineNetwork(members=2, channels=4)
     rng = np.random.default_rng(0)
-    faces = rng.integers(0, 256, (3, 30, 25)).astype(np.uint8)
+    faces = rng.normal(size=(3, 30, 25)).astype(np.float32)
     places = rng.uniform(-0.5, 0.5, (7, 2))
     with torch.no_grad():
         network.stretch_logits.normal_()
         network.origin_tilt.fill_(-0.1)
-        gaze = network.gaze(standardised(faces[:, None]))
+        gaze = network.gaze(torch.from_numpy(faces[:, None]))
         scaled = torch.from_numpy(places / ANGLE_SCALE_RAD).float()[None, None]
         learned = network.log_density(gaze, scaled).numpy() - 2 * np.log(ANGLE_SCALE_RAD)
     for member in range(2):
         weights = np.where(np.arange(2) == member, 0.0, -np.inf)
         belief = GazeLineBelief(
-            lambda look: look.face,
+            contrast,
             GazeLinePass(network),
             network.mixture().as_numpy(),
             weights,
@@ -193,7 +193,9 @@ def test_the_belief_in_numpy_equals_the_network_in_torch():
 
 def test_weights_that_code_a_face_decay_and_the_numbers_of_the_belief_do_not():
     def trained(weight_decay: float) -> dict[str, np.ndarray]:
-        config = GazeLineConfig(members=2, channels=4, weight_decay=weight_decay)
+        config = GazeLineConfig(
+            members=2, channels=4, first_guess='none', weight_decay=weight_decay
+        )
         learner, rng = GazeLineLearner(config, seed=3), np.random.default_rng(1)
         for _ in range(5):
             learner.update(made_trial(rng)[0])
@@ -293,12 +295,16 @@ def test_a_snapshot_stays_as_it_was_while_the_learner_goes_on(learner):
     rng = np.random.default_rng(7)
     face, places = drawn_face(np.array([0.3, 0.1])), LOOK + rng.uniform(-0.5, 0.5, (4, 2))
     snapshot = learner.snapshot()
-    before = snapshot.log_density(face[None], LOOK, places)
-    assert np.array_equal(before, learner.snapshot().log_density(face[None], LOOK, places))
+    before = snapshot.log_density(standardised(face)[None], LOOK, places)
+    assert np.array_equal(
+        before, learner.snapshot().log_density(standardised(face)[None], LOOK, places)
+    )
     for _ in range(20):
         learner.update(made_trial(rng)[0])
-    assert np.array_equal(before, snapshot.log_density(face[None], LOOK, places))
-    assert not np.allclose(before, learner.snapshot().log_density(face[None], LOOK, places))
+    assert np.array_equal(before, snapshot.log_density(standardised(face)[None], LOOK, places))
+    assert not np.allclose(
+        before, learner.snapshot().log_density(standardised(face)[None], LOOK, places)
+    )
 
 
 def test_without_top_down_attention_the_best_guess_is_proposed_whatever_stands_there():
@@ -312,7 +318,10 @@ def test_without_top_down_attention_the_best_guess_is_proposed_whatever_stands_t
 
 def test_what_was_fixated_changes_nothing():
     """It does not use the fixation: all that was seen counts alike."""
-    learners = [GazeLineLearner(GazeLineConfig(members=3, channels=4), seed=1) for _ in range(2)]
+    learners = [
+        GazeLineLearner(GazeLineConfig(members=3, channels=4, first_guess='none'), seed=1)
+        for _ in range(2)
+    ]
     rng = np.random.default_rng(1)
     for _ in range(5):
         trial, attended = made_trial(rng)
@@ -345,7 +354,7 @@ def test_a_restored_learner_goes_on_bit_for_bit(learner):
     # After fifteen trials it weighs, too.
     for _ in range(20):
         learner.update(made_trial(rng)[0])
-    again = GazeLineLearner(GazeLineConfig(members=3, channels=4), seed=99)
+    again = GazeLineLearner(GazeLineConfig(members=3, channels=4, first_guess='none'), seed=99)
     again.restore(learner.state())
     for _ in range(3):
         trial, _ = made_trial(rng)

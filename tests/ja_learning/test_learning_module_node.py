@@ -457,11 +457,10 @@ def test_evidence_is_published_with_every_image(make_trials):
     trials.bench.wait(lambda: len(trials.bench.messages(EVIDENCE)) == 2)
     stamps = [message.header for message in trials.bench.messages(EVIDENCE)]
     assert stamps == [header(100 * MS), header(200 * MS)]
-    published = [
-        decode_columns(m, ['log_evidence'])['log_evidence']
-        for m in trials.bench.messages(EVIDENCE)
-    ]
-    assert published == [[0.0], [0.0]], 'nothing is known yet'
+    for message in trials.bench.messages(EVIDENCE):
+        columns = decode_columns(message, ['log_evidence', 'expected_gain'])
+        assert columns['log_evidence'] == 0.0, 'nothing is known yet'
+        assert np.isnan(columns['expected_gain']), 'and it does not know what it can'
 
 
 def test_a_trial_that_was_given_up_is_learned_by_a_learner_that_needs_no_fixation(make_trials):

@@ -24,7 +24,10 @@ def origin(ranges=False):
 
 def test_tracks_have_names():
     assert [str(track) for track in TRACKS] == [
-        'strict', 'strict with depth', 'landmarks', 'landmarks with depth',
+        'strict', 'strict with depth',
+        'self-supervised', 'self-supervised with depth',
+        'synthetic others', 'synthetic others with depth',
+        'landmarks', 'landmarks with depth',
     ]  # fmt: skip
     assert [Track.parse(str(track)) for track in TRACKS] == list(TRACKS)
     with pytest.raises(ValueError, match="'magic' is no track: strict"):
@@ -34,6 +37,35 @@ def test_tracks_have_names():
 def test_the_reader_of_faces_decides_the_start():
     assert Track.of_learner(PIXELS) == Track(Start.STRICT)
     assert Track.of_learner(LANDMARKS, depth=True) == Track(Start.LANDMARKS, depth=True)
+
+
+@pytest.mark.parametrize(
+    ('first_guess', 'start'),
+    [
+        ('none', Start.STRICT),
+        ('eigenfaces', Start.STRICT),
+        ('watched', Start.SELF_SUPERVISED),
+        ('others', Start.SYNTHETIC_OTHERS),
+    ],
+)
+def test_a_face_code_decides_the_start_of_a_learner_from_pixels(first_guess, start):
+    config = GazeLineConfig(first_guess=first_guess)
+    assert Track.of_learner(config) == Track(start)
+    landmarks = GazeLineConfig(first_guess=first_guess, face_reader='landmarks')
+    assert Track.of_learner(landmarks).start is Start.LANDMARKS
+
+
+def test_a_checkpoint_names_the_files_that_the_learner_has_opened(saved):
+    start = origin()
+    start.set_weight_files(EYES)
+    start.set_code_files({'code.npz': 'c' * 64})
+    path = saved(start)
+    _, description = load_checkpoint(path)
+    assert description['weight_files'] == EYES | {'code.npz': 'c' * 64}
+    again = origin()
+    again.set_code_files({'code.npz': 'd' * 64})
+    assert resume(path, again).path == path
+    assert again.set_weight_files(EYES).startswith('code.npz was cccc')
 
 
 def test_the_papers_network_is_strict_whatever_there_is():

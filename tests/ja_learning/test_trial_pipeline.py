@@ -1,5 +1,7 @@
 """The trial pipeline: which trials it hands over, in which order, and what it proposes."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -25,6 +27,9 @@ class Log:
     def propose(self, look, posture, candidates, ranges=None):
         self.events.append('propose')
         return TURN
+
+    def expected_gain(self, look, candidates, ranges=None):
+        return 0.7 if len(candidates) > 1 else float('nan')
 
     def belief(self, look, rng, count):
         return np.tile(TURN, (count, 1))
@@ -92,6 +97,7 @@ def test_nothing_is_proposed_between_trials(head, log):
     proposal = head.look()
     assert proposal.delta is TURN
     assert proposal.log_evidence == 1.5
+    assert math.isnan(proposal.expected_gain)
     assert head.pipeline.draw_belief(np.random.default_rng(0)).shape == (BELIEF_SAMPLES, 2)
     head.pipeline.drop_trial()
     assert head.rest(0.3).delta is None

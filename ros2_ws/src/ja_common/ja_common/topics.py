@@ -126,7 +126,8 @@ GLANCE_DELTA = Topic(
 EVIDENCE = Topic(
     'learning_module/evidence',
     PointCloud2,
-    'log evidence [nats] that the learner does better than chance; one point, `log_evidence`',
+    'one point: `log_evidence` [nats] that the learner does better than chance, and '
+    '`expected_gain`, 0 to 1, by its own belief (NaN: unknown)',
     **_LINK,
 )
 BELIEF = Topic(
@@ -138,7 +139,8 @@ BELIEF = Topic(
 TRACK = Topic(
     'learning_module/track',
     String,
-    'what the learner starts from: strict or landmarks, each with depth once it has used ranges',
+    'what the learner starts from: strict, self-supervised, synthetic others or landmarks, each '
+    'with depth once it has used ranges',
     **_LATCHED,
 )
 FIXATION = Topic(

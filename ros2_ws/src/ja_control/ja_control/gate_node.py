@@ -49,6 +49,7 @@ from ja_control.core.urdf_limits import narrow_limits
 from ja_control.gate_status import encode_gate_status
 
 _PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, GLANCE_DELTA, FIXATION)
+_EVIDENCE_COLUMNS = ('log_evidence', 'expected_gain')
 # Longer than any image takes: the head does not turn in the time of a clock set forward.
 _LONGEST_STEP_S = 2.0
 _STATUS_EVERY_S = 0.1
@@ -126,7 +127,7 @@ class GateNode(GraphNode):
 
         self._synchroniser = Synchroniser(self, self._joints)
         deltas = dict.fromkeys(_PROPOSALS, self._joints.decode)
-        self._synchroniser.call_with({**deltas, EVIDENCE: _log_evidence}, self._act)
+        self._synchroniser.call_with({**deltas, EVIDENCE: _decode_evidence}, self._act)
         self._output = CommandOutput(self, self.configure(CommandOutputConfig))
         self._status = self.create_topic_publisher(GATE_STATUS)
         self.advertise_service(SetBool, 'enable', self._on_enable)
@@ -231,7 +232,8 @@ class GateNode(GraphNode):
                 lm_delta=found[LM_DELTA],
                 glance_delta=found[GLANCE_DELTA],
                 fixation=found[FIXATION],
-                log_evidence=found[EVIDENCE],
+                log_evidence=found[EVIDENCE][0],
+                expected_gain=found[EVIDENCE][1],
             )
         )
         self._guard.set_target(decision.target)
@@ -322,11 +324,16 @@ class GateNode(GraphNode):
         return response
 
 
-def _log_evidence(message: PointCloud2) -> float:
-    column = decode_columns(message, ['log_evidence'])['log_evidence']
-    if column.shape != (1,) or not np.isfinite(column[0]):
-        raise ValueError(f'{EVIDENCE.name} must be one finite number, found {column}')
-    return float(column[0])
+def _decode_evidence(message: PointCloud2) -> tuple[float, float]:
+    """Return log evidence and expected gain; the gain is NaN where it is unknown or missing."""
+    known = [field.name for field in message.fields if field.name in _EVIDENCE_COLUMNS]
+    columns = decode_columns(message, list(dict.fromkeys(['log_evidence', *known])))
+    evidence, gain = columns['log_evidence'], columns.get('expected_gain', np.full(1, np.nan))
+    if evidence.shape != (1,) or not np.isfinite(evidence[0]):
+        raise ValueError(f'{EVIDENCE.name} must be one finite number, found {evidence}')
+    if gain.shape != (1,) or gain[0] < 0 or gain[0] > 1:  # NaN is neither: it is unknown
+        raise ValueError(f'expected_gain must be one number from 0 to 1, found {gain}')
+    return float(evidence[0]), float(gain[0])
 
 
 def main(args: list[str] | None = None) -> None:

@@ -97,6 +97,7 @@ class LearningModuleNode(GraphNode):
             self.configure(LookAroundConfig),
             self._config.still_below_rad_s,
             self._config.seed,
+            self._learner.mean_face,
         )
         synchroniser = Synchroniser(self, self._joints)
         # First the proposal for an image, then its update, and only then the next proposal.
@@ -141,7 +142,7 @@ class LearningModuleNode(GraphNode):
         if choice != self._choice:
             self._choice = choice
             self._learner.reset()
-            self._pipeline.drop_trial()
+            self._pipeline.forget()
 
     def _propose(self, found: StampedSet) -> None:
         header, detections = found.header, self._learner.allowed(found[DETECTIONS])
@@ -150,7 +151,10 @@ class LearningModuleNode(GraphNode):
         proposal = self._pipeline.process_image(found.posture, detections, face, gaze)
         self._delta.publish(self._joints.encode(header, proposal.delta))
         self._glance_delta.publish(self._joints.encode(header, proposal.glance))
-        evidence = {'log_evidence': [proposal.log_evidence]}
+        evidence = {
+            'log_evidence': [proposal.log_evidence],
+            'expected_gain': [proposal.expected_gain],
+        }
         self._evidence.publish(encode_columns(header, evidence))
         self.health.values['log evidence [nats]'] = f'{proposal.log_evidence:.1f}'
         self._learner.report_health()
@@ -179,7 +183,7 @@ class LearningModuleNode(GraphNode):
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         self._learner.reset()
-        self._pipeline.drop_trial()
+        self._pipeline.forget()
         response.success, response.message = True, 'everything learned is forgotten'
         return response
 

@@ -14,13 +14,14 @@ from std_srvs.srv import Trigger
 from ja_common.core.background_save import RETRY_S
 from ja_common.core.detection import Detection
 from ja_common.core.health import Level
+from ja_common.core.weight_files import note_weight_files
 from ja_common.graph_node import GraphNode
 from ja_common.realtime import use_default_scheduling
 from ja_common.topics import TRACK, WEIGHT_FILES
 from ja_common.weight_files_codec import decode_weight_files
 from ja_learning.core.background_learner import BackgroundLearner
 from ja_learning.core.checkpoint_folder import CheckpointConfig, CheckpointFolder, Resumed
-from ja_learning.core.learner import Learner, Predictor
+from ja_learning.core.learner import KnowsAPerson, Learner, Predictor
 from ja_learning.core.track import Origin, Track, TrackConfig
 from ja_learning.core.trial import Trial
 
@@ -53,10 +54,12 @@ class PersistentLearner:
         self._published_track: Track | None = None
         self._behind = BEHIND_IN_LOCKSTEP if lockstep else None
         self._checkpoints = self._open(node.configure(CheckpointConfig))
-        learner = make()
+        learner = self._made()
         self._config = learner.config
         if self._checkpoints is not None and self._checkpoints.config.resume:
             self._resume(learner)
+        self.mean_face = learner.mean_face if isinstance(learner, KnowsAPerson) else None
+        """Of the person of whom was learned before the start, if any is kept."""
         self._background = self._in_background(learner)
         self._unsaved = ''  # why the last save failed, until one succeeds
         self._was_unsaved = False
@@ -91,7 +94,7 @@ class PersistentLearner:
 
     def reset(self) -> None:
         """Forget everything, in the newest checkpoint too; `load_checkpoint` can go back."""
-        forgotten = self._replace(self._make())
+        forgotten = self._replace(self._made())
         if self._checkpoints is not None:
             self._try(self._checkpoints.save_when_changed, forgotten)
         self._origin.reset()
@@ -135,6 +138,13 @@ class PersistentLearner:
             return None
         folder = self._node.namespaced_folder(config.checkpoint_folder)
         return CheckpointFolder(folder, config, self._origin)
+
+    def _made(self) -> Learner:
+        """Make an untrained learner, and note the weight files that it opens."""
+        with note_weight_files() as files:
+            learner = self._make()
+        self._origin.set_code_files(files)
+        return learner
 
     def _in_background(self, learner: Learner) -> BackgroundLearner:
         # An update is not urgent, even where answers are (`realtime_priority`).
@@ -220,7 +230,7 @@ class PersistentLearner:
         return response
 
     def _on_load(self, _: Trigger.Request, response: Trigger.Response) -> Any:
-        learner = self._make()
+        learner = self._made()
         path = self._report_resumed(learner, self._kept_in().go_back(learner))
         if path is None:
             raise ValueError(f'no checkpoint in {self._kept_in().folder}')

@@ -95,7 +95,7 @@ class CycleInput:
 
     `glance_delta`: to a view that the learner proposes before the shift. `fixation`: direction
     (2,) [rad] of the object in the centre, or None. `log_evidence` [nats]: that the learner does
-    better than chance.
+    better than chance. `expected_gain`: how much better, as the learner believes, 0-1, or NaN.
     """
 
     posture: Posture
@@ -105,6 +105,7 @@ class CycleInput:
     glance_delta: NDArray[np.float64] | None = None
     fixation: NDArray[np.float64] | None = None
     log_evidence: float = 0.0
+    expected_gain: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,7 @@ class AttentionCycle:
             Phase.SEARCH: self._step_search,
             Phase.HOME: self._step_home,
         }[self.phase]
-        self._p_lm = self.gating.p_lm(self.trials, percept.log_evidence)
+        self._p_lm = self.gating.p_lm(self.trials, percept.log_evidence, percept.expected_gain)
         step(percept)
         target = percept.posture.position if self._target is None else self._target
         return Decision(target, self.phase, self._source, self._p_lm, self.trials, self._shifts)

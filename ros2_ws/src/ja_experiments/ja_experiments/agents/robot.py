@@ -143,6 +143,7 @@ class Robot:
             glance_delta=proposal.glance,
             fixation=fixation,
             log_evidence=proposal.log_evidence,
+            expected_gain=proposal.expected_gain,
         )
         decision = self._cycle.step(percept)
         return Step(self._limits.clip(decision.target), decision, fixation, proposal.delta)

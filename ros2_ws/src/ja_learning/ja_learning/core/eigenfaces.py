@@ -14,31 +14,34 @@ from ja_learning.core.gaze_features import Features
 from ja_learning.core.trial import FACE_SHAPE
 
 COMPONENTS = 6
-PRIOR = Features(np.full(COMPONENTS, 0.7), np.append(np.full(COMPONENTS, 0.35), 0.2))
-"""Deviations of the weights of the features before any trial; the last even feature is 1.
+PRIOR = Features(
+    np.append(np.full(COMPONENTS, 0.7), 0.3), np.append(np.full(COMPONENTS, 0.35), 0.2)
+)
+"""Deviations of the weights of the features before any trial.
 
 A feature is as large as the share of its component in the variance, so that most of the gaze is
-expected in the first ones.
+expected in the first ones. The last feature of both, 1, has the gaze of the mean face: over few
+looks her gazes do not cancel out.
 """
 
 _PIXELS = FACE_SHAPE[0] * FACE_SHAPE[1]
-_LEAST_VARIANCE = 0.06
 
 
 class Eigenfaces:
     """The components of some faces; features of any others follow from them."""
 
-    def __init__(self, faces: NDArray[np.uint8]) -> None:
-        """Find the components of faces, uint8 (n, 30, 25)."""
+    def __init__(self, faces: NDArray[np.floating]) -> None:
+        """Find the components of faces, as contrasts (n, 30, 25) (`mean_face`)."""
         odd, even = _parts(faces)
         self._mean = even.mean(axis=0)
         self._odd, self._even = _components(odd), _components(even - self._mean)
 
-    def features(self, faces: NDArray[Any]) -> Features:
-        """Return the features of faces, uint8 (n, 30, 25): pan (n, 6), tilt (n, 7)."""
+    def features(self, faces: NDArray[np.floating]) -> Features:
+        """Return the features of faces, as contrasts (n, 30, 25): (n, 7) for pan and for tilt."""
         odd, even = _parts(faces)
-        tilt = (even - self._mean) @ self._even.T
-        return Features(odd @ self._odd.T, np.append(tilt, np.ones((len(tilt), 1)), axis=1))
+        one = np.ones((len(odd), 1))
+        pan, tilt = odd @ self._odd.T, (even - self._mean) @ self._even.T
+        return Features(np.append(pan, one, axis=1), np.append(tilt, one, axis=1))
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Return the components as named arrays."""
@@ -59,13 +62,11 @@ class Eigenfaces:
 
 
 def _parts(faces: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the odd and the even part of each standardised face, each (n, 750)."""
-    pictures = np.asarray(faces, float).reshape(-1, *FACE_SHAPE)
-    centred = pictures - pictures.mean(axis=(1, 2), keepdims=True)
-    centred /= np.sqrt(pictures.var(axis=(1, 2), keepdims=True) + _LEAST_VARIANCE)
-    mirrored = centred[:, :, ::-1]
-    flat = (len(pictures), _PIXELS)
-    return ((centred - mirrored) / 2).reshape(flat), ((centred + mirrored) / 2).reshape(flat)
+    """Return the odd and the even part of each face, each (n, 750)."""
+    contrasts = np.asarray(faces, float).reshape(-1, *FACE_SHAPE)
+    mirrored = contrasts[:, :, ::-1]
+    flat = (len(contrasts), _PIXELS)
+    return ((contrasts - mirrored) / 2).reshape(flat), ((contrasts + mirrored) / 2).reshape(flat)
 
 
 def _components(parts: NDArray[np.float64]) -> NDArray[np.float64]:

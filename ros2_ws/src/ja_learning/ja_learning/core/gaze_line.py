@@ -18,7 +18,9 @@ and half of the members are re-initialised.
 """
 
 import copy
+import zlib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,16 +29,18 @@ from numpy.typing import NDArray
 from torch import nn
 
 from ja_learning.core.checkpoint_arrays import count, counts, numbers
-from ja_learning.core.eigenface_posterior import EigenfacePosterior
+from ja_learning.core.contrast_memory import CONTRAST, ContrastMemory
+from ja_learning.core.eigenface_posterior import GUESS_BEGINS, EigenfacePosterior
 from ja_learning.core.evidence import ChangeAlarm, Evidence
+from ja_learning.core.face_code import OTHERS, WATCHED, FaceCode, load_face_code
 from ja_learning.core.gaze_line_belief import AnswersFromSnapshot, GazeLineBelief
 from ja_learning.core.gaze_line_config import GazeLineConfig
-from ja_learning.core.gaze_line_network import GazeLineNetwork, give_member, standardised
+from ja_learning.core.gaze_line_network import GazeLineNetwork, give_member
 from ja_learning.core.gaze_line_pass import GazeLinePass
 from ja_learning.core.gaze_line_places import seen_places
 from ja_learning.core.gaze_table import level_mixture
-from ja_learning.core.replay_memory import ReplayMemory
-from ja_learning.core.trial import FACE_SHAPE, Look, Trial
+from ja_learning.core.mean_face import contrast
+from ja_learning.core.trial import FACE_SHAPE, Look, MeanFace, Trial
 
 # Annealing ends after so many trials for every pair of candidates: the more candidates there are,
 # the more trials it takes to tell one from another. A small number is a fast annealing rate.
@@ -56,6 +60,8 @@ _GUESSED_AGAIN_AT = (36, 72, 150, 300)
 _FEWEST_OTHERS = 4
 # By so much the first guess is more probable than an untrained network before any evidence.
 _BEFORE_EVIDENCE_NATS, _UNTRAINED_TRIALS = 6.0, 60
+# Of the evidence from another person so much is kept: enough for the gate to stay open.
+_OF_ANOTHER_NATS = 5.0
 _COMPARED_EVERY_TRIALS = 10
 _REPLACED_BEHIND_NATS = 15.0
 _CLEAR_NATS = 10.0
@@ -78,8 +84,9 @@ class GazeLineLearner(AnswersFromSnapshot):
         self._annealing = _annealing(config)
         # How many trials were remembered when each member started.
         self._began = np.zeros(config.members, int)
-        self._memory = ReplayMemory(config.replay_memory)
+        self._memory = ContrastMemory(config.replay_memory)
         self._seed = seed
+        self._code = _face_code(config)
         self._first_guess = self._start_first_guess()
         # Of each candidate of the trials remembered, what the first guess makes of it.
         self._shares: list[NDArray[np.float32]] = []
@@ -97,7 +104,21 @@ class GazeLineLearner(AnswersFromSnapshot):
     @property
     def log_evidence(self) -> float:
         """Return the evidence [nats] that the face informs this learner, as in `Predictor`."""
-        return float(self._evidence.nats[-1])
+        nats = self._evidence.nats
+        if self._first_guess is None:
+            return float(nats[-1])
+        # A mean of e-values is one (`evidence`). The mixture is held down by what it believed at
+        # first; the first guess may begin at any of its fits, and has bet nothing until then.
+        guess = np.logaddexp(nats[-2], np.log(GUESS_BEGINS - 1)) - np.log(GUESS_BEGINS)
+        return float(np.logaddexp(nats[-1], guess) - np.log(2))
+
+    @property
+    def mean_face(self) -> MeanFace | None:
+        """Return the mean face of the person of whom it has learned last, or whom it watched."""
+        watched = None if self._code is None else self._code.mean_face
+        if self._memory.mean_face is None and watched is not None:
+            return MeanFace(zlib.crc32(watched.tobytes()), watched)
+        return self._memory.mean_face
 
     def snapshot(self) -> GazeLineBelief:
         """Return what is believed now, made when first asked for; no later update changes it."""
@@ -114,14 +135,18 @@ class GazeLineLearner(AnswersFromSnapshot):
         places = seen_places(trial.look, trial.candidates, trial.ranges).astype(np.float32)
         changed = False
         if trial.seen_before_shift:
-            changed = self._weigh(trial.face, places[: trial.seen_before_shift])
-        self._memory.remember_trial(trial.face, places)
+            changed = self._weigh(contrast(trial.look), places[: trial.seen_before_shift])
+        self._memory.remember(trial, places)
+        if self._memory.of_present_person == 1:
+            self._meet_another_person()
         if self._first_guess is not None:
             fitted = self._first_guess.add_newest()
             if fitted:
                 # It is another guess now: what spoke against the one before does not concern it.
                 self._evidence.nats[-2] = max(0.0, float(self._evidence.nats[-2]))
-            self._guess_shares(of_all=fitted or self.trials in _GUESSED_AGAIN_AT)
+            again = fitted or self._first_guess.trials in _GUESSED_AGAIN_AT
+            guessed = min(self._first_guess.trials, len(self._memory)) if again else 1
+            self._guess_shares(guessed, known=guessed - 1)
         if changed:
             self._reinitialise(self._alarm.doubtful_trials)
         inverse_temperature = self._inverse_temperature()
@@ -130,16 +155,25 @@ class GazeLineLearner(AnswersFromSnapshot):
         if self.trials % _COMPARED_EVERY_TRIALS == 0:
             self._replace_worst_member()
 
+    def _meet_another_person(self) -> None:
+        """Keep what is known, but let it show anew what it is worth with this person."""
+        np.minimum(self._evidence.nats, _OF_ANOTHER_NATS, out=self._evidence.nats)
+        if self._first_guess is not None:  # her face has other axes
+            self._first_guess = EigenfacePosterior(self._memory, self._seed, 0, self._code)
+            self._evidence.nats[-2] = 0.0
+
     def _start_first_guess(self) -> EigenfacePosterior | None:
+        """Return a first guess from the trials with the present person, if there is to be one."""
         if self.config.first_guess == 'none':
             return None
-        return EigenfacePosterior(self._memory, self._seed)
+        present = self._memory.of_present_person
+        return EigenfacePosterior(self._memory, self._seed, present, self._code)
 
     def _no_evidence(self) -> Evidence:
         if self.config.first_guess == 'none':
-            return Evidence(self.config.members + 1)
+            return Evidence(self.config.members + 1, CONTRAST)
         # The first guess knows something long before fifteen trials.
-        return Evidence(self.config.members + 2, fewest_others=_FEWEST_OTHERS)
+        return Evidence(self.config.members + 2, CONTRAST, _FEWEST_OTHERS)
 
     def _mixed_belief(self) -> GazeLineBelief:
         """Return the belief of all members, and of the first guess if there is one."""
@@ -164,7 +198,7 @@ class GazeLineLearner(AnswersFromSnapshot):
                 log_weights = members - np.logaddexp.reduce(members)
                 surest = int(np.argmax(members))
         return GazeLineBelief(
-            lambda look: look.face,
+            contrast,
             gaze_of,
             mixture,
             log_weights,
@@ -173,20 +207,24 @@ class GazeLineLearner(AnswersFromSnapshot):
             self.config.plausible_within_nats,
             # The weight of the first guess is shared by its maps, of which the likeliest is first.
             surest,
+            # Untrained networks are sure of nothing in particular.
+            calibrated=guess is not None and guess.is_known,
         )
 
-    def _guess_shares(self, of_all: bool) -> None:
-        """Note what the first guess makes of the candidates of the newest trial, or of all."""
+    def _guess_shares(self, count: int, known: int) -> None:
+        """Note what the first guess makes of the candidates of so many newest trials.
+
+        `known`: of how many of them something is noted already.
+        """
         guess = self._first_guess
         assert guess is not None
-        known = len(self._memory)
-        ages = np.arange(known if of_all else 1)[::-1]
-        faces, places = self._memory.trials_at(ages)
+        faces, places = self._memory.trials_at(np.arange(count)[::-1])
         shares = [
             _candidate_shares(guess, face, seen[~np.isnan(seen[:, 0])])
             for face, seen in zip(faces, places, strict=True)
         ]
-        self._shares = (shares if of_all else [*self._shares, *shares])[-known:]
+        earlier = self._shares[: len(self._shares) - known]
+        self._shares = [*earlier, *shares][-len(self._memory) :]
 
     def _log_weights(self) -> NDArray[np.float64]:
         nats = self._evidence.nats[:-1].copy()
@@ -194,12 +232,12 @@ class GazeLineLearner(AnswersFromSnapshot):
             nats[-1] += max(0.0, _BEFORE_EVIDENCE_NATS * (1 - self.trials / _UNTRAINED_TRIALS))
         return nats - np.logaddexp.reduce(nats)
 
-    def _weigh(self, face: NDArray[np.uint8], places: NDArray[np.float32]) -> bool:
+    def _weigh(self, face: NDArray[np.float32], places: NDArray[np.float32]) -> bool:
         """Weigh what was seen; return whether it is clear by now that the world has changed."""
 
-        def log_probability(faces: NDArray[np.uint8]) -> NDArray[np.float64]:
+        def log_probability(faces: NDArray[np.float32]) -> NDArray[np.float64]:
             with torch.no_grad():
-                gaze = self._mean.gaze(standardised(faces[:, None]))
+                gaze = self._mean.gaze(torch.from_numpy(faces[:, None]))
                 seen = torch.from_numpy(places)[None, None]
                 negatives = self._draw_negatives(_WEIGHING_NEGATIVES)
                 ratio = self._mean.log_ratio(gaze, seen, negatives)
@@ -220,10 +258,12 @@ class GazeLineLearner(AnswersFromSnapshot):
         count = min(self.config.replay_batch, known)
         # Each member replays its own choice, so that they differ; the newest trial always.
         ages = torch.randint(known, (count, members), generator=self._random).numpy()
+        # Of a new person there are few trials yet: every second one is hers.
+        ages[::2] %= self._memory.of_present_person
         ages[0] = 0
         faces, places = self._memory.trials_at(ages)
         loss = self._loss(
-            self._augmented(standardised(faces)),
+            self._augmented(torch.from_numpy(faces)),
             torch.from_numpy(places).transpose(0, 1),
             self._log_prior(ages, places),
             inverse_temperature,
@@ -326,7 +366,7 @@ class GazeLineLearner(AnswersFromSnapshot):
         self._began[:] = 0
         self._first_guess = self._start_first_guess()
         if self._first_guess is not None:
-            self._guess_shares(of_all=True)
+            self._guess_shares(self._first_guess.trials, known=self._first_guess.trials)
         self._optimiser.state.clear()
         self._steps = 0
 
@@ -401,13 +441,13 @@ class GazeLineLearner(AnswersFromSnapshot):
             p: _loaded_moments(arrays, f'optimiser.{name}.', tuple(p.shape))
             for name, p in self._network.named_parameters()
         }
-        memory = ReplayMemory.restored(arrays, self.config.replay_memory)
+        memory = ContrastMemory.restored(arrays, self.config.replay_memory)
         evidence = self._no_evidence()
         evidence.restore(arrays)
         seed, guess, shares = self._seed, self._first_guess, self._shares
         if guess is not None:
             seed = count(arrays, 'seed')
-            guess = EigenfacePosterior.restored(arrays, memory, seed)
+            guess = EigenfacePosterior.restored(arrays, memory, seed, self._code)
             seen_in = counts(arrays, 'candidate_counts')
             flat = numbers(arrays, 'candidate_shares', (int(seen_in.sum()),), low=0.0, high=1.0)
             shares = np.split(flat, np.cumsum(seen_in))[:-1]
@@ -431,6 +471,13 @@ class GazeLineLearner(AnswersFromSnapshot):
         self._steps, self.trials, self._belief = steps, trials, None
         self._annealing, self._began = annealing, began
         self._alarm.doubt, self._alarm.doubtful_trials = doubt, doubtful
+
+
+def _face_code(config: GazeLineConfig) -> FaceCode | None:
+    """Return the face code that the first guess reads with, if it is one."""
+    if config.first_guess not in (WATCHED, OTHERS):
+        return None
+    return load_face_code(Path(config.face_code), config.first_guess)
 
 
 def _initial_network(config: GazeLineConfig, seed: int) -> GazeLineNetwork:
@@ -460,7 +507,7 @@ def _annealing(config: GazeLineConfig) -> NDArray[np.float64]:
 
 
 def _first_guess_ratio(
-    guess: EigenfacePosterior, faces: NDArray[np.uint8], places: NDArray[np.float32]
+    guess: EigenfacePosterior, faces: NDArray[np.float32], places: NDArray[np.float32]
 ) -> NDArray[np.float64]:
     """Return the log ratio (n,) of the first guess on the scale of the members' ones."""
     if not guess.is_known:
@@ -469,7 +516,7 @@ def _first_guess_ratio(
 
 
 def _candidate_shares(
-    guess: EigenfacePosterior, face: NDArray[np.uint8], places: NDArray[np.float32]
+    guess: EigenfacePosterior, face: NDArray[np.float32], places: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     """Return how probable the first guess makes each of places (m, 8) the attended one, (m,)."""
     alike = 1 / max(len(places), 1)

@@ -1,5 +1,6 @@
 """What the fast learner believes at one instant; a question changes nothing."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -29,6 +30,7 @@ class GazeLineBelief:
     where one is plausible; else always the best guess on the line of gaze.
     `plausible_within_nats`: how much less probable than the best guess an object may be. `surest`:
     the member that makes the best guess; None: that of the largest weight.
+    `calibrated`: whether its probabilities can be taken at their word (`expected_gain`).
     """
 
     def __init__(
@@ -41,7 +43,9 @@ class GazeLineBelief:
         top_down: bool,
         plausible_within_nats: float,
         surest: int | None = None,
+        calibrated: bool = True,
     ) -> None:
+        self._calibrated = calibrated
         self._log_weights = log_weights
         self._read, self._gaze_of, self._mixture = read, gaze_of, mixture
         self._surest = int(np.argmax(log_weights)) if surest is None else surest
@@ -70,6 +74,36 @@ class GazeLineBelief:
             if density[best] > self._peak(coded, places[best]) - self._plausible_within:
                 aim = places[best, IN_VIEW] * ANGLE_SCALE_RAD
         return look.face_at + aim - np.asarray(posture, float)
+
+    def probabilities(
+        self, look: Look, candidates: ArrayLike, ranges: ArrayLike | None = None
+    ) -> NDArray[np.float64] | None:
+        """Return the probability (m,) of each of candidates (m, 2) [rad] to be the gaze target.
+
+        Given that one of them is. `ranges` (m, 2) [m]: as in `Trial`. None where the look shows
+        nothing that it reads.
+        """
+        coded = self._code(look)
+        if coded is None:
+            return None
+        density = self._mixed(coded, seen_places(look, candidates, ranges))[0]
+        shares = np.exp(density - density.max(initial=-np.inf))
+        return np.asarray(shares / shares.sum())
+
+    def expected_gain(
+        self, look: Look, candidates: ArrayLike, ranges: ArrayLike | None = None
+    ) -> float:
+        """Return how much better than chance the most probable of the candidates is, as believed.
+
+        As in `Predictor`: (q - c) / (1 - c) with its probability q and c = 1 / m.
+        """
+        count = len(np.asarray(candidates))
+        if count < 2 or not self._calibrated:
+            return math.nan
+        shares = self.probabilities(look, candidates, ranges)
+        if shares is None:
+            return math.nan
+        return float((shares.max() - 1 / count) / (1 - 1 / count))
 
     def belief(self, look: Look, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
         """Draw directions (count, 2) [rad] from the belief about the gaze target."""
@@ -181,6 +215,12 @@ class AnswersFromSnapshot:
     ) -> NDArray[np.float64] | None:
         """Return a change of posture (2,) [rad] towards the most probable gaze target."""
         return self.snapshot().propose(look, posture, candidates, ranges)
+
+    def expected_gain(
+        self, look: Look, candidates: ArrayLike, ranges: ArrayLike | None = None
+    ) -> float:
+        """Return how much better than a choice by chance its choice is, by what it believes."""
+        return self.snapshot().expected_gain(look, candidates, ranges)
 
     def belief(self, look: Look, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
         """Draw directions (count, 2) [rad] from the belief about the gaze target."""

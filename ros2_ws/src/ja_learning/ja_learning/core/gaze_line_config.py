@@ -17,10 +17,14 @@ class GazeLineConfig(Configuration):
         choices=('pixels', 'landmarks'),
     )
     first_guess: str = parameter(
-        'none',
+        'eigenfaces',
         'what reads her face until the networks can: nothing, or a linear map of the principal '
-        'components of her faces, of which the whole posterior is known (pixels only)',
-        choices=('none', 'eigenfaces'),
+        'components of her faces, of which the whole posterior is known (pixels only); or such a '
+        'map of a face code that was trained on watching her, or on others, each another track',
+        choices=('none', 'eigenfaces', 'watched', 'others'),
+    )
+    face_code: str = parameter(
+        '', 'file of the face code, for first_guess watched or others, by tools/train_face_code.py'
     )
     members: int = parameter(6, 'networks that learn side by side', low=1, high=64)
     replay_steps: int = parameter(4, 'gradient steps a trial', low=1, high=1000)

@@ -13,7 +13,6 @@ import math
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import nn
 
 from ja_learning.core.gaze_line_mixture import (
@@ -28,8 +27,6 @@ from ja_learning.core.trial import FACE_SHAPE
 
 STRETCHES = torch.exp(torch.linspace(np.log(FIRST_STRETCH), np.log(LAST_STRETCH), STRETCH_COUNT))
 _HIDDEN = 64
-# Of the pixels, 0-255, of a face that is not to be blown up.
-LEAST_VARIANCE = 0.06
 
 
 class GazeLineNetwork(nn.Module):
@@ -69,7 +66,7 @@ class GazeLineNetwork(nn.Module):
         return [*(layer.weight for layer in layers), self.hidden_weights, self.gaze_weights]
 
     def gaze(self, faces: torch.Tensor) -> torch.Tensor:
-        """Return u, (members, n, 2), of standardised faces (n, members or 1, 30, 25)."""
+        """Return u, (members, n, 2), of contrasts of faces (n, members or 1, 30, 25)."""
         faces = faces.expand(-1, self.members, -1, -1)
         # Grouped convolutions are faster with the channels last.
         pictures = torch.cat([faces, faces.flip(-1)]).to(memory_format=torch.channels_last)
@@ -143,11 +140,6 @@ class GazeLineNetwork(nn.Module):
         """Return the forms of the parts of p(c | face), (members, n, 6, stretches)."""
         pan, tilt = gaze.split(1, dim=-1)
         return torch.stack(self.mixture().forms(pan, tilt, torch.log), dim=2)
-
-
-def standardised(faces: NDArray[np.uint8] | torch.Tensor) -> torch.Tensor:
-    """Return faces uint8 (..., 30, 25) as floats, each with mean 0 and deviation 1."""
-    return nn.functional.layer_norm(torch.as_tensor(faces).float(), FACE_SHAPE, eps=LEAST_VARIANCE)
 
 
 def give_member(tensor: torch.Tensor, members: int, giver: int, taker: int) -> None:

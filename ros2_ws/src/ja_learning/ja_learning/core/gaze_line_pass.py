@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from torch import nn
 
 from ja_learning.core.compiled import compiled
-from ja_learning.core.gaze_line_network import LEAST_VARIANCE, GazeLineNetwork
+from ja_learning.core.gaze_line_network import GazeLineNetwork
 
 # Weights (inputs, outputs) and biases (outputs,), for each member where there is one axis more;
 # inputs are ordered by row, column and channel.
@@ -41,8 +41,8 @@ class GazeLinePass:
         )
 
     def __call__(self, faces: ArrayLike) -> NDArray[np.float64]:
-        """Return u, shape (members, n, 2), of faces uint8 (n, 30, 25)."""
-        return _gazes(np.ascontiguousarray(faces, np.uint8), *self._layers)
+        """Return u, shape (members, n, 2), of faces, as contrasts (n, 30, 25)."""
+        return _gazes(np.ascontiguousarray(faces, np.float32), *self._layers)
 
 
 def _convolution(layer: nn.Conv2d, members: int) -> _Layer:
@@ -64,7 +64,7 @@ def _gazes(faces, first, second, third, hidden, gaze):  # type: ignore[no-untype
     members, channels = len(hidden[0]), first[0].shape[1] // len(hidden[0])
     found = np.zeros((members, len(faces), 2))
     for n in range(len(faces)):
-        picture = _standardised(faces[n])
+        picture = _padded(faces[n])
         for mirrored in range(2):
             if mirrored:
                 picture = np.ascontiguousarray(picture[:, ::-1])
@@ -81,15 +81,11 @@ def _gazes(faces, first, second, third, hidden, gaze):  # type: ignore[no-untype
 
 
 @njit(nogil=True)
-def _standardised(face):  # type: ignore[no-untyped-def]
-    """Scale to mean 0 and deviation 1, with two rows and columns of 0 around, (34, 29, 1)."""
+def _padded(face):  # type: ignore[no-untyped-def]
+    """Return a face with two rows and columns of 0 around, (34, 29, 1)."""
     rows, columns = face.shape
-    mean = face.mean()
-    scale = 1 / np.sqrt(face.var() + LEAST_VARIANCE)
     picture = np.zeros((rows + 4, columns + 4, 1), np.float32)
-    for row in range(rows):
-        for column in range(columns):
-            picture[row + 2, column + 2, 0] = (face[row, column] - mean) * scale
+    picture[2 : rows + 2, 2 : columns + 2, 0] = face
     return picture
 
 

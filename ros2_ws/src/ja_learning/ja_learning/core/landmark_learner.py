@@ -43,7 +43,7 @@ class LandmarkLearner(AnswersFromSnapshot):
         self.trials = 0
         self._posterior = GazePosterior(PRIOR, self._random(_PRIOR))
         self._memory = ReplayMemory(_REMEMBERED, READING)
-        self._tables = self._tabulate(self._memory)
+        self._tables = self._tabulate(self._memory, 0)
         self._evidence = Evidence(faces=READING)
         self._alarm = ChangeAlarm()
         self._belief: GazeLineBelief | None = None
@@ -109,14 +109,14 @@ class LandmarkLearner(AnswersFromSnapshot):
     def _forget_before_change(self) -> None:
         """Keep only the trials since the change, and draw half of the maps anew."""
         self._memory.keep_newest(self._alarm.doubtful_trials)
-        self._tables = self._tabulate(self._memory)
+        self._tables = self._tabulate(self._memory, len(self._memory))
         self._alarm.reset()
         self._evidence.nats[:] = 0.0
         self._posterior.doubt_half(self._tables.all(), self._random(_CHANGE))
 
     @staticmethod
-    def _tabulate(memory: ReplayMemory) -> TrialTables:
-        return TrialTables(memory, landmark_features, _REMEMBERED)
+    def _tabulate(memory: ReplayMemory, trials: int) -> TrialTables:
+        return TrialTables(memory, landmark_features, _REMEMBERED, trials)
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Return all that learning has changed, the remembered trials too, as named arrays."""
@@ -125,6 +125,7 @@ class LandmarkLearner(AnswersFromSnapshot):
             'seed': np.array(self._seed),
             'doubt': np.array(self._alarm.doubt),
             'doubtful_trials': np.array(self._alarm.doubtful_trials),
+            'tabled_trials': np.array(self._tables.trials),
         }
         return arrays | self._posterior.state() | self._memory.state() | self._evidence.state()
 
@@ -140,8 +141,10 @@ class LandmarkLearner(AnswersFromSnapshot):
         evidence.restore(arrays)
         trials, seed = count(arrays, 'trials'), count(arrays, 'seed')
         doubt = float(numbers(arrays, 'doubt', (), np.float64, low=0.0))
-        doubtful = count(arrays, 'doubtful_trials')
+        doubtful, tabled = count(arrays, 'doubtful_trials'), count(arrays, 'tabled_trials')
+        if tabled < len(memory):
+            raise ValueError(f'tabled_trials must be at least {len(memory)}')
         self._posterior, self._memory, self._evidence = posterior, memory, evidence
-        self._tables = self._tabulate(memory)
+        self._tables = self._tabulate(memory, tabled)
         self.trials, self._seed, self._belief = trials, seed, None
         self._alarm.doubt, self._alarm.doubtful_trials = doubt, doubtful

@@ -1,11 +1,11 @@
 """The interface of every learner. Importing it loads no learner (`learner_registry` does)."""
 
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ja_learning.core.trial import Look, Trial
+from ja_learning.core.trial import Look, MeanFace, Trial
 
 
 class Predictor(Protocol):
@@ -34,6 +34,29 @@ class Predictor(Protocol):
 
         (0, 2) where the look shows this learner nothing.
         """
+
+
+@runtime_checkable
+class KnowsItsGain(Protocol):
+    """A predictor that may know how good its proposals are; others need not have this."""
+
+    def expected_gain(
+        self, look: Look, candidates: ArrayLike, ranges: ArrayLike | None = None
+    ) -> float:
+        """Return how much better than a choice by chance its choice is, by what it believes.
+
+        0: not at all, 1: it is sure. NaN where it does not know that, or fewer than two objects
+        are seen. Arguments as in `propose`.
+        """
+
+
+@runtime_checkable
+class KnowsAPerson(Protocol):
+    """A learner that keeps the mean face of a person; others need not have this."""
+
+    @property
+    def mean_face(self) -> MeanFace | None:
+        """Return that of the person of whom it has learned last, if any."""
 
 
 class TrainablePredictor(Predictor, Protocol):

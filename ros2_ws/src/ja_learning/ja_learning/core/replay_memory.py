@@ -23,11 +23,16 @@ class ReplayMemory:
 
     def __init__(self, capacity: int, faces: FaceFormat = PICTURE) -> None:
         """Start empty; a full memory of `capacity` trials drops its oldest."""
-        self._capacity = capacity
+        self._capacity, self._format = capacity, faces
         self._faces: NDArray[Any] = np.zeros((0, *faces.shape), faces.dtype)
         self._places = np.zeros((0, MOST_CANDIDATES, PLACE_COLUMNS), np.float32)
         self._newest = -1
         self._count = 0
+
+    @property
+    def capacity(self) -> int:
+        """Return how many trials it keeps at most."""
+        return self._capacity
 
     def __len__(self) -> int:
         return self._count
@@ -44,10 +49,9 @@ class ReplayMemory:
         self._places[self._newest, : len(kept)] = kept
 
     def trials_at(self, ages: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[np.float32]]:
-        """Return faces and places (..., m, 8) of these ages, the newest 0."""
-        index = self._index(ages)
-        widest = int(self._seen(index).max(initial=0))
-        return self._faces[index], self._places[index, :widest]
+        """Return faces, as they are read, and places (..., m, 8) of these ages, the newest 0."""
+        faces, places = self._kept_at(ages)
+        return self._read(faces, ages), places
 
     def places_at(
         self, ages: NDArray[np.int64], which: NDArray[np.floating]
@@ -66,7 +70,7 @@ class ReplayMemory:
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Return all that is remembered, oldest first, as named arrays."""
-        faces, places = self.trials_at(np.arange(self._count)[::-1])
+        faces, places = self._kept_at(np.arange(self._count)[::-1])
         there = ~np.isnan(places[..., 0])
         seen = places[there]
         known = known_from_eyes(seen)
@@ -85,6 +89,13 @@ class ReplayMemory:
         cls, arrays: dict[str, NDArray[Any]], capacity: int, faces: FaceFormat = PICTURE
     ) -> 'ReplayMemory':
         """Make a memory from `state()`; ValueError if it is none of such faces."""
+        memory = cls(capacity, faces)
+        memory._take(arrays)
+        return memory
+
+    def _take(self, arrays: dict[str, NDArray[Any]]) -> None:
+        """Remember the trials of `state()`, in an empty memory; ValueError if it is none."""
+        capacity, faces = self._capacity, self._format
         seen_in = counts(arrays, 'candidate_counts')
         if len(seen_in) > capacity or (seen_in > MOST_CANDIDATES).any():
             raise ValueError(
@@ -102,10 +113,18 @@ class ReplayMemory:
             places[index, _FROM_EYES] = numbers(
                 arrays, 'candidates_from_eyes', (len(index), columns)
             )
-        memory = cls(capacity, faces)
         for face, seen in zip(remembered, np.split(places, np.cumsum(seen_in))[:-1], strict=True):
-            memory.remember_trial(face, seen)
-        return memory
+            self.remember_trial(face, seen)
+
+    def _kept_at(self, ages: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[np.float32]]:
+        """Return faces as they are kept, and places (..., m, 8), of these ages."""
+        index = self._index(ages)
+        widest = int(self._seen(index).max(initial=0))
+        return self._faces[index], self._places[index, :widest]
+
+    def _read(self, faces: NDArray[Any], ages: NDArray[np.int64]) -> NDArray[Any]:
+        """Return the faces of these ages as the learner reads them."""
+        return faces
 
     def _index(self, ages: NDArray[np.int64]) -> NDArray[np.int64]:
         return (self._newest - ages) % max(len(self._faces), 1)
@@ -115,7 +134,7 @@ class ReplayMemory:
 
     def _grow(self) -> None:
         more = min(max(64, self._count), self._capacity - self._count)
-        faces, places = self.trials_at(np.arange(self._count)[::-1])
+        faces, places = self._kept_at(np.arange(self._count)[::-1])
         self._faces = np.concatenate([faces, np.zeros((more, *faces.shape[1:]), faces.dtype)])
         shape = (self._count + more, MOST_CANDIDATES, PLACE_COLUMNS)
         padded = np.full(shape, np.nan, np.float32)

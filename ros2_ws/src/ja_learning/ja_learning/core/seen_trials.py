@@ -29,21 +29,27 @@ class SeenTrials(NamedTuple):
 
 
 class TrialTables:
-    """The tables of the newest trials of a memory, at most `capacity`.
+    """The tables of the newest trials of a memory, at most `capacity` and as many as it keeps.
 
-    All of it follows from what the memory has, so that no file needs it. A memory without this
-    many trials must have grown by one with each call of `add_newest`.
+    All of it follows from what the memory has and from `trials`, so that no file needs it.
+    `trials` counts those that were ever added; each keeps its place, so that sums have the same
+    order after a restart.
     """
 
-    def __init__(self, memory: ReplayMemory, features_of: FeaturesOf, capacity: int) -> None:
-        """Make the tables of the trials that are there, the oldest first."""
-        self._memory, self._features_of, self._capacity = memory, features_of, capacity
+    def __init__(
+        self, memory: ReplayMemory, features_of: FeaturesOf, capacity: int, trials: int
+    ) -> None:
+        """Make the tables of so many newest trials, the oldest first."""
+        self._memory, self._features_of = memory, features_of
+        self._capacity = min(capacity, memory.capacity)
         self._tables = np.zeros((0, *SHAPE), np.float32)
         self._counts = np.zeros(0, np.int64)
         self._sum = np.zeros(SHAPE)
         self._newest, self._count = -1, 0
         self._features = features_of(memory.trials_at(np.arange(0))[0])
-        for age in range(min(len(memory), capacity))[::-1]:
+        known = min(trials, self._capacity, len(memory))
+        self.trials = trials - known
+        for age in range(known)[::-1]:
             self._add(age)
 
     def __len__(self) -> int:
@@ -72,9 +78,10 @@ class TrialTables:
         return SeenTrials(self._features_of(faces), tables, counted, self.chance())
 
     def _add(self, age: int) -> None:
-        if self._count == len(self._tables) < self._capacity:
+        self._newest = self.trials % self._capacity
+        while self._newest >= len(self._tables):
             self._grow()
-        self._newest = (self._newest + 1) % len(self._tables)
+        self.trials += 1
         self._count = min(self._count + 1, self._capacity)
         faces, places = self._memory.trials_at(np.array([age]))
         seen = places[0, ~np.isnan(places[0, :, 0])]

@@ -1,9 +1,12 @@
 """The track of a learner: what it starts from. Tracks are never mixed in one table.
 
 `strict`: random initial weights and own trials only. The face detector is innate, as in the paper
-(Nagai et al. 2003). `landmarks`: foreign weights read her face (`face_gaze`). Each may be with
-depth: the learner has used ranges. A track is what a learner has really used, so it can only gain
-depth while the learner learns, and a learner that never received a range has none.
+(Nagai et al. 2003). `self-supervised`: the same, and a face code learned from watching her,
+without labels (`watched_face_code`). `synthetic others`: the same, and a face code learned from
+the candidate sets of other, simulated caregivers (`others_face_code`). `landmarks`: foreign
+weights read her face (`face_gaze`). Each may be with depth: the learner has used ranges. A track
+is what a learner has really used, so it can only gain depth while the learner learns, and a
+learner that never received a range has none.
 """
 
 from collections.abc import Iterable, Mapping
@@ -24,10 +27,19 @@ class Start(str, Enum):
     """What the eyes and the learner have before the first trial."""
 
     STRICT = 'strict'
+    SELF_SUPERVISED = 'self-supervised'
+    SYNTHETIC_OTHERS = 'synthetic others'
     LANDMARKS = 'landmarks'
 
 
 _START_OF_READER = {'pixels': Start.STRICT, 'landmarks': Start.LANDMARKS}
+# A learner that reads pixels, by its first guess.
+_START_OF_GUESS = {
+    'none': Start.STRICT,
+    'eigenfaces': Start.STRICT,
+    'watched': Start.SELF_SUPERVISED,
+    'others': Start.SYNTHETIC_OTHERS,
+}
 
 
 @dataclass(frozen=True)
@@ -58,14 +70,21 @@ class Track:
         """Return the track of a learner by its configuration, `depth` if it has used ranges.
 
         A learner that reads no faces in several ways (no `face_reader`), the paper's, reads
-        pixels and uses no ranges. Raises ValueError for a reader that has no track.
+        pixels and uses no ranges. Raises ValueError for a reader or a first guess that has no
+        track.
         """
         reader = getattr(config, 'face_reader', None)
         if reader is None:
             return Track()
         if reader not in _START_OF_READER:
             raise ValueError(f'face_reader {reader!r} has no track: name one in {__name__}')
-        return Track(_START_OF_READER[reader], depth)
+        start = _START_OF_READER[reader]
+        if start is Start.STRICT:
+            guess = getattr(config, 'first_guess', 'none')
+            if guess not in _START_OF_GUESS:
+                raise ValueError(f'first_guess {guess!r} has no track: name one in {__name__}')
+            start = _START_OF_GUESS[guess]
+        return Track(start, depth)
 
 
 TRACKS = tuple(Track(start, depth) for start in Start for depth in (False, True))
@@ -90,6 +109,7 @@ class Origin:
         self._used_ranges = False
         self._learned_with: dict[str, str] = {}
         self._weight_files: dict[str, str] = {}
+        self._code_files: dict[str, str] = {}
 
     def reset(self) -> None:
         """Forget what a learner has used that knows nothing any more."""
@@ -113,15 +133,20 @@ class Origin:
         Returns in one clause how they differ from those that the learner has learned with; '' if
         they do not.
         """
-        self._learned_with = self._weight_files or self._learned_with
+        if self._weight_files:
+            self._learned_with = self._weight_files | self._code_files
         self._weight_files = dict(files)
         return self.changed_weight_files()
+
+    def set_code_files(self, files: Mapping[str, str]) -> None:
+        """Take the weight files, name -> SHA-256, that the learner itself has opened."""
+        self._code_files = dict(files)
 
     def changed_weight_files(self) -> str:
         """Return in one clause how the weight files differ from those before; '' if unknown."""
         if not (self._learned_with and self._weight_files):
             return ''
-        return changed_weight_files(self._learned_with, self._weight_files)
+        return changed_weight_files(self._learned_with, self._weight_files | self._code_files)
 
     def track(self, config: Any) -> Track:
         """Return the track of a learner of this configuration: what it has really used."""
@@ -132,7 +157,7 @@ class Origin:
         return {
             'track': str(self.track(config)),
             'track_allowed': str(Track.of_learner(config, self._may_use_ranges)),
-            'weight_files': self._weight_files or self._learned_with,
+            'weight_files': (self._weight_files or self._learned_with) | self._code_files,
         }
 
     def check(self, description: Mapping[str, Any], config: Any) -> None:

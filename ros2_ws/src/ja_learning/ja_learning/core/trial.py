@@ -55,28 +55,40 @@ def unknown_ranges(count: int) -> NDArray[np.float64]:
     return np.full((count, 2), np.nan)
 
 
+class MeanFace(NamedTuple):
+    """The mean face of a person over her looks so far (`mean_face`).
+
+    `person`: a number that is another one for another person. `picture`: float32 (30, 25), the
+    mean of standardised pictures.
+    """
+
+    person: int
+    picture: NDArray[np.float32]
+
+
 @dataclass(frozen=True, eq=False)
 class Look:
     """The last image of a look at the caregiver: all that a learner may read her gaze from.
 
     `face`: uint8 (30, 25), seen in the direction `face_at`, (2,) [rad]. `face_range`: her distance
     and its standard deviation, (2,) [m]; NaN where unknown. `gaze`: her head pose and eyes as read
-    from landmarks; None where they were not read.
+    from landmarks; None where they were not read. `mean_face`: hers, None where it is unknown.
     """
 
     face: NDArray[np.uint8]
     face_at: NDArray[np.float64]
     face_range: NDArray[np.float64] = field(default_factory=lambda: unknown_ranges(1)[0])
     gaze: FaceGaze | None = None
+    mean_face: MeanFace | None = None
 
 
 @dataclass(frozen=True)
 class Trial:
     """One trial, finished: all that a learner learns from.
 
-    `face`, `face_at`, `face_range`, `gaze`: the look, as in `Look`. `postures`: (n, 2) [rad],
-    where each shift began, the look at the caregiver first. `fixation`: (2,) [rad], direction of
-    the object fixated at the end, or None when the trial was given up.
+    `face`, `face_at`, `face_range`, `gaze`, `mean_face`: the look, as in `Look`.
+    `postures`: (n, 2) [rad], where each shift began, the look at the caregiver first. `fixation`:
+    (2,) [rad], direction of the object fixated at the end, or None when the trial was given up.
     `candidates`: (m, 2) [rad], directions of all objects that were seen meanwhile; the first
     `seen_before_shift` of them were seen before the head acted on the face. `ranges`: (m, 2) [m],
     their distances from the camera and standard deviations; NaN where unknown, None where no
@@ -92,11 +104,12 @@ class Trial:
     ranges: NDArray[np.float64] | None = None
     face_range: NDArray[np.float64] = field(default_factory=lambda: unknown_ranges(1)[0])
     gaze: FaceGaze | None = None
+    mean_face: MeanFace | None = None
 
     @property
     def look(self) -> Look:
         """Return the look at the caregiver with which the trial began."""
-        return Look(self.face, self.face_at, self.face_range, self.gaze)
+        return Look(self.face, self.face_at, self.face_range, self.gaze, self.mean_face)
 
     @property
     def led_to(self) -> NDArray[np.float64]:
@@ -219,6 +232,7 @@ class TrialRecorder:
             self.ranges,
             look.face_range,
             look.gaze,
+            look.mean_face,
         )
 
     def drop_trial(self) -> None:

@@ -10,6 +10,7 @@ and on each fixation it hands over the trial that the fixation has ended. The no
 (which drive the node) and the experiments all use it. It knows no truth, no thread and no ROS.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -20,9 +21,10 @@ from ja_common.core.detection import Detection, caregiver_face, objects
 from ja_common.core.face_gaze import FaceGaze
 from ja_common.core.geometry import directions_of_rays
 from ja_common.core.posture import Posture
-from ja_learning.core.learner import Predictor
+from ja_learning.core.learner import KnowsItsGain, Predictor
 from ja_learning.core.look_around import LookAround, LookAroundConfig
-from ja_learning.core.trial import Look, Trial, TrialRecorder
+from ja_learning.core.mean_face import MeanFaceTracker
+from ja_learning.core.trial import Look, MeanFace, Trial, TrialRecorder, checked_face
 
 BELIEF_SAMPLES = 200
 
@@ -36,11 +38,13 @@ class Proposal:
 
     `delta`: to the gaze target. `glance`: to a view that is worth a glance before that.
     `log_evidence` [nats]: that the face informs the learner, when it was last asked.
+    `expected_gain`: of its choice over a choice by chance, as in `Predictor`; NaN: unknown.
     """
 
     log_evidence: float
     delta: NDArray[np.float64] | None = None
     glance: NDArray[np.float64] | None = None
+    expected_gain: float = math.nan
 
 
 class TrialPipeline:
@@ -53,12 +57,14 @@ class TrialPipeline:
         look_around: LookAroundConfig,
         still_below_rad_s: float,
         seed: int,
+        mean_face: MeanFace | None = None,
     ) -> None:
         """Start between two trials.
 
         `predictor` returns what is believed now; it is called only while a trial is under way.
         `on_trial` takes each finished trial, those that were given up included (`Trial.fixation`
-        is then None): it updates the learner, or not.
+        is then None): it updates the learner, or not. `mean_face`: that of the person of whom the
+        learner has learned last, if it has.
         """
         self._predictor = predictor
         self._on_trial = on_trial
@@ -67,6 +73,8 @@ class TrialPipeline:
         self._still_below = still_below_rad_s
         self._random = np.random.default_rng(seed)
         self._log_evidence = 0.0
+        self._mean_face = MeanFaceTracker(mean_face)
+        self._attends = False
 
     def process_image(
         self,
@@ -80,7 +88,7 @@ class TrialPipeline:
         `face`: the picture of the caregiver's face, uint8 (30, 25), if the head attends to it, and
         `gaze`: her head pose and eyes, if they were read.
         """
-        given_up = self._observe(posture, _look(posture, detections, face, gaze))
+        given_up = self._observe(posture, self._look(posture, detections, face, gaze))
         proposal = self._propose(posture, objects(detections))
         if given_up is not None:
             self._on_trial(given_up, posture)
@@ -107,6 +115,11 @@ class TrialPipeline:
         """Drop the trial under way."""
         self._trial.drop_trial()
 
+    def forget(self) -> None:
+        """Drop the trial under way, and forget who is before the head."""
+        self.drop_trial()
+        self._mean_face = MeanFaceTracker()
+
     def _observe(self, posture: Posture, look: Look | None) -> Trial | None:
         """Return the trial before, if this image shows that it was given up."""
         here = posture.position
@@ -131,19 +144,25 @@ class TrialPipeline:
         predictor = self._predictor()
         self._log_evidence = predictor.log_evidence
         delta = predictor.propose(trial.look, here, trial.candidates, trial.ranges)
+        gain = math.nan
+        if isinstance(predictor, KnowsItsGain):
+            gain = predictor.expected_gain(trial.look, trial.candidates, trial.ranges)
         glance = None if view is None else view - here
-        return Proposal(self._log_evidence, delta, glance)
+        return Proposal(self._log_evidence, delta, glance, gain)
 
-
-def _look(
-    posture: Posture,
-    detections: list[Detection],
-    face: ArrayLike | None,
-    gaze: FaceGaze | None,
-) -> Look | None:
-    """Return the look at the caregiver that this image shows, or None."""
-    seen = caregiver_face(detections)
-    if face is None or seen is None:
-        return None
-    face_at = directions_of_rays(posture.position, seen.ray)
-    return Look(np.asarray(face), face_at, seen.range, gaze)
+    def _look(
+        self,
+        posture: Posture,
+        detections: list[Detection],
+        face: ArrayLike | None,
+        gaze: FaceGaze | None,
+    ) -> Look | None:
+        """Return the look at the caregiver that this image shows, or None."""
+        seen = caregiver_face(detections)
+        attended, self._attends = self._attends, face is not None and seen is not None
+        if face is None or seen is None:
+            return None
+        picture = checked_face(face)
+        face_at = directions_of_rays(posture.position, seen.ray)
+        mean_face = self._mean_face.observe(picture, begins_look=not attended)
+        return Look(picture, face_at, seen.range, gaze, mean_face)
