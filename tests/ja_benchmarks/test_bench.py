@@ -8,19 +8,23 @@ import types
 import pytest
 
 from ja_benchmarks import run_benchmarks as bench
-from ja_benchmarks.rows import row
+from ja_benchmarks.rows import Row, row
 from ja_benchmarks.run_benchmarks import benchmarks, run_benchmarks
 from ja_common.core.config import ConfigError
 
 
 @pytest.fixture
 def two_benchmarks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """`slow` and `fast`, in place of those that are installed."""
-    for name, value in (('slow', 1.0), ('fast', 9.0)):
-        module = types.ModuleType(name)
-        rows = {'speed': {'value': value, 'unit': 'm/s', 'n': 3, 'interval': [0.5, 9.5]}}
-        module.run = lambda rows=rows: rows  # type: ignore[attr-defined]
-        monkeypatch.setitem(sys.modules, name, module)
+    """`slow` and `fast`, in place of those that are installed; `slow` has a quick form."""
+
+    def rows(value: float) -> dict[str, Row]:
+        return {'speed': {'value': value, 'unit': 'm/s', 'n': 3, 'interval': [0.5, 9.5]}}
+
+    slow, fast = types.ModuleType('slow'), types.ModuleType('fast')
+    slow.run = lambda quick=False: rows(2.0 if quick else 1.0)  # type: ignore[attr-defined]
+    fast.run = lambda: rows(9.0)  # type: ignore[attr-defined]
+    for module in (slow, fast):
+        monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setattr(bench, 'benchmarks', lambda: {'fast': 'fast', 'slow': 'slow'})
 
 
@@ -41,6 +45,21 @@ def test_one_or_all_are_printed_and_written(tmp_path, capsys):
     assert run_benchmarks(None, path) == 0
     assert set(json.loads(path.read_text())) == {'slow/speed', 'fast/speed'}
     assert 'm/s' in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures('two_benchmarks')
+@pytest.mark.parametrize('name', ['slow', None])
+def test_quick_runs_the_quick_forms_under_names_of_their_own(name, tmp_path):
+    path = tmp_path / 'figures.json'
+    assert run_benchmarks(name, path, quick=True) == 0
+    figures = json.loads(path.read_text())
+    assert {key: figure['value'] for key, figure in figures.items()} == {'slow --quick/speed': 2.0}
+
+
+@pytest.mark.usefixtures('two_benchmarks')
+def test_a_benchmark_without_a_quick_form_is_named():
+    with pytest.raises(ConfigError, match='fast has no quick form; these have one: slow'):
+        run_benchmarks('fast', None, quick=True)
 
 
 @pytest.mark.usefixtures('two_benchmarks')

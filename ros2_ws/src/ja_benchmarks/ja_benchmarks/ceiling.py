@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -37,16 +38,17 @@ def ceiling(trials: int = 8000) -> dict[str, Row]:
         scene = load_scene('default')
         scene = dataclasses.replace(scene, objects=dataclasses.replace(scene.objects, count=count))
         # She attends to the first object of each row; the order of drawing has no influence.
-        positions = _arrangements(scene, trials)
+        positions = draw_arrangements(scene, trials, np.random.default_rng(0))
         directions = directions_of_vectors(positions)
-        looked_at = _looked_at(scene, positions[:, 0])
+        looked_at = draw_looked_at(scene, positions[:, 0], np.random.default_rng(1))
         lines = directions_of_vectors(_along_gaze(scene, looked_at))
         off_line = angle_between(lines[:, None], directions[:, :, None]).min(axis=2)
         rows[f'ceiling, {count} objects, nearest to the line of gaze'] = share_row(
             off_line.argmin(axis=1) == 0
         )
+        head = draw_heads(scene, looked_at, np.random.default_rng(2))
         rows[f'ceiling, {count} objects, her head alone'] = share_row(
-            _likelihood_of_head(scene, looked_at, directions).argmax(axis=1) == 0
+            _likelihood_of_head(scene, head, directions).argmax(axis=1) == 0
         )
         guess = _one_guess(directions_of_vectors(_face(scene) - looked_at), directions[:, 0])
         off_guess = angle_between(guess[:, None], directions)
@@ -66,9 +68,9 @@ def ceiling_of_senses(trials: int = 4000) -> dict[str, Row]:
     for count in (5, 10):
         scene = load_scene('default')
         scene = dataclasses.replace(scene, objects=dataclasses.replace(scene.objects, count=count))
-        positions = _arrangements(scene, trials)
+        positions = draw_arrangements(scene, trials, np.random.default_rng(0))
         directions, distances = directions_of_vectors(positions), np.linalg.norm(positions, axis=2)
-        looked_at = _looked_at(scene, positions[:, 0])
+        looked_at = draw_looked_at(scene, positions[:, 0], np.random.default_rng(1))
         gaze = directions_of_vectors((looked_at - _face(scene)) * _TO_HER_FRAME)
         rng = np.random.default_rng(3)
         for reader, error_deg in {'exact gaze': (0.0, 0.0), **READER_ERRORS_DEG}.items():
@@ -116,9 +118,9 @@ def _face(scene: Scene) -> np.ndarray:
     return np.array([scene.caregiver.distance_m, 0.0, 0.0])
 
 
-def _arrangements(scene: Scene, trials: int) -> np.ndarray:
+def draw_arrangements(scene: Scene, trials: int, rng: np.random.Generator) -> np.ndarray:
     """Return positions of the objects (T, N, 3) [m] as the world draws them."""
-    arrangement = Arrangement(scene.objects, _face(scene), np.random.default_rng(0))
+    arrangement = Arrangement(scene.objects, _face(scene), rng)
     places = []
     for _ in range(trials):
         arrangement.rearrange()
@@ -126,11 +128,37 @@ def _arrangements(scene: Scene, trials: int) -> np.ndarray:
     return np.array(places)
 
 
-def _looked_at(scene: Scene, attended: np.ndarray) -> np.ndarray:
+def draw_looked_at(scene: Scene, attended: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Return where her eyes point (T, 3) [m] when she attends to objects at (T, 3) [m]."""
-    rng, deviation = np.random.default_rng(1), np.radians(scene.caregiver.gaze_noise_deg)
+    deviation = np.radians(scene.caregiver.gaze_noise_deg)
     eyes = np.broadcast_to(_face(scene), (2, 3))
     return np.array([missed_point(each, eyes, rng.normal(0.0, deviation, 2)) for each in attended])
+
+
+def draw_heads(scene: Scene, looked_at: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return yaw and pitch (T, 2) [rad] of her head when her eyes point at places (T, 3) [m]."""
+    spec = scene.caregiver
+    taken = rng.uniform(*spec.head_share, len(looked_at))
+    error = rng.normal(0.0, np.radians(spec.head_noise_deg), (len(looked_at), 2))
+    gaze = directions_of_vectors((looked_at - _face(scene)) * _TO_HER_FRAME)
+    return taken[:, None] * gaze + error
+
+
+def heads_towards(
+    scene: Scene, directions: np.ndarray, steps: int
+) -> Iterator[tuple[np.ndarray, float]]:
+    """Yield where her head points (..., 2) [rad] for objects at (..., 2) [rad], and how surely.
+
+    The second is the standard deviation [rad]. The distance of the object and the head's share of
+    the gaze are not known: `steps` values of each, all that the scene allows, are equally likely.
+    """
+    spec, face = scene.caregiver, _face(scene)
+    for distance in np.linspace(*scene.objects.distance_m, steps):
+        places = distance * vectors_of_directions(directions)
+        gaze = directions_of_vectors((places - face) * _TO_HER_FRAME)
+        for share in np.linspace(*spec.head_share, steps):
+            deviation = np.radians(np.hypot(spec.head_noise_deg, share * spec.gaze_noise_deg))
+            yield share * gaze, float(deviation)
 
 
 def _one_guess(gaze: np.ndarray, directions: np.ndarray) -> np.ndarray:
@@ -161,25 +189,10 @@ def _along_gaze(scene: Scene, attended: np.ndarray, steps: int = 60) -> np.ndarr
     return np.array(lines)
 
 
-def _likelihood_of_head(
-    scene: Scene, looked_at: np.ndarray, directions: np.ndarray, steps: int = 17
-) -> np.ndarray:
-    """Return the likelihood (T, N) of her head's angles for each object at directions (T, N, 2).
-
-    The distance of the object and the head's share of the gaze are not known: all values that the
-    scene allows are equally likely.
-    """
-    spec, face = scene.caregiver, _face(scene)
-    rng = np.random.default_rng(2)
-    taken = rng.uniform(*spec.head_share, len(looked_at))
-    error = rng.normal(0.0, np.radians(spec.head_noise_deg), (len(looked_at), 2))
-    head = taken[:, None] * directions_of_vectors((looked_at - face) * _TO_HER_FRAME) + error
+def _likelihood_of_head(scene: Scene, head: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """Return the likelihood (T, N) of her head (T, 2) for each object at directions (T, N, 2)."""
     likelihood = np.zeros(directions.shape[:2])
-    for distance in np.linspace(*scene.objects.distance_m, steps):
-        places = distance * vectors_of_directions(directions)
-        gaze = directions_of_vectors((places - face) * _TO_HER_FRAME)
-        for share in np.linspace(*spec.head_share, steps):
-            deviation = np.radians(np.hypot(spec.head_noise_deg, share * spec.gaze_noise_deg))
-            off = (head[:, None] - share * gaze) / deviation
-            likelihood += np.exp(-0.5 * (off**2).sum(axis=-1)) / deviation**2
+    for towards, deviation in heads_towards(scene, directions, steps=17):
+        off = (head[:, None] - towards) / deviation
+        likelihood += np.exp(-0.5 * (off**2).sum(axis=-1)) / deviation**2
     return likelihood

@@ -6,6 +6,7 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import bootstrap
+from scipy.stats import t as student
 
 from ja_common.core.statistics import over_seeds, wilson_interval
 
@@ -62,8 +63,13 @@ def share_row(hits: ArrayLike, unit: str = 'share') -> Row:
 
 
 def mean_row(values: ArrayLike, unit: str) -> Row:
-    """Return the mean of independent values (n,) with its 95 % interval."""
+    """Return the mean of independent values (n,) with its 95 % interval (Student)."""
     values = np.asarray(values, float)
     mean, error = float(values.mean()), float(values.std(ddof=1) / np.sqrt(len(values)))
-    interval = [mean - 1.96 * error, mean + 1.96 * error]
-    return {'value': mean, 'unit': unit, 'n': len(values), 'interval': interval}
+    half = float(student.ppf(0.975, len(values) - 1)) * error
+    return {
+        'value': mean,
+        'unit': unit,
+        'n': len(values),
+        'interval': [mean - half, mean + half],
+    }

@@ -14,29 +14,33 @@ reader (`ceiling_of_senses`).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ja_benchmarks.benchmarks.learning_speed import ARRANGEMENTS, draw_places
 from ja_benchmarks.ceiling import ceiling_of_senses
+from ja_benchmarks.learner_alone import (
+    LOOKS,
+    TEST_LOOKS,
+    TRIALS,
+    Question,
+    draw_question,
+    draw_test,
+    next_seed,
+    render_looks,
+    success,
+)
 from ja_benchmarks.rows import Row, success_row
-from ja_common.core.face_gaze import FaceGaze
-from ja_experiments.datasets.looks import Looks, load_looks
+from ja_experiments.datasets.looks import Looks, LooksOrder, load_looks
 from ja_experiments.processes import run_in_processes
 from ja_learning.core.gaze_line_config import GazeLineConfig
-from ja_learning.core.learner import Predictor
 from ja_learning.core.learner_registry import make_learner
+from ja_learning.core.mean_face import MeanFaceTracker
 from ja_learning.core.track import Track
-from ja_learning.core.trial import Look, Trial, unknown_ranges
+from ja_learning.core.trial import MeanFace
 
 SEEDS = range(20, 30)
-TRIALS = 600
-TEST_LOOKS = 250
-LOOKS = TRIALS + TEST_LOOKS
-# Other objects stand where the default scene puts objects.
-_DISTANCES_M = (0.6, 1.0)
 
 
 @dataclass(frozen=True)
@@ -78,8 +82,7 @@ CONDITIONS = (
 
 def run() -> dict[str, Row]:
     """Measure the success of the learner alone: means over seeds with their 95 % intervals."""
-    for seed in SEEDS:
-        _looks(seed)
+    render_looks(LooksOrder('default', seed, LOOKS, senses=True) for seed in SEEDS)
     tasks = [(condition, seed) for condition in CONDITIONS for seed in SEEDS]
     found = dict(zip(tasks, run_in_processes('learning', curve, tasks), strict=True))
     rows: dict[str, Row] = {}
@@ -94,83 +97,33 @@ def run() -> dict[str, Row]:
 
 def curve(condition: SensesTask, seed: int) -> list[float]:
     """Return the success of one learner alone, 0-1, after each of the marks."""
-    rng = np.random.default_rng([seed, condition.objects])
-    looks = _looks(seed)
-    others = _looks(SEEDS[(SEEDS.index(seed) + 1) % len(SEEDS)])
+    objects, depth = condition.objects, condition.depth
+    rng = np.random.default_rng([seed, objects])
+    looks, others = _looks(seed), _looks(next_seed(SEEDS, seed))
     learner = make_learner('gaze_line', seed, GazeLineConfig(face_reader=condition.face_reader))
-    found = []
+    tracker, found = MeanFaceTracker(), []
     for trial in range(1, max(condition.marks) + 1):
         changed = condition.change_at and trial > condition.change_at
         # At once: after the change, before the first trial with her.
         if changed and trial == condition.change_at + 1 and trial in condition.marks:
-            found.append(success(learner.snapshot(), others[-TEST_LOOKS:], condition, seed))
+            found.append(success(learner.snapshot(), _test(others, condition, seed)))
         world = others if changed else looks
         index = (trial - 1 - (condition.change_at if changed else 0)) % TRIALS
-        look, places, ranges, _ = _scene(rng, world, index, condition)
-        shown = rng.permutation(len(places))
-        learner.update(
-            Trial(
-                look.face,
-                look.face_at,
-                world.postures[index][None],
-                places[rng.integers(len(places))],
-                places[shown],
-                len(shown),
-                ranges[shown],
-                look.face_range,
-                look.gaze,
-            )
-        )
+        mean_face = tracker.observe(world.faces[index], begins_look=True)
+        question = draw_question(rng, world, index, objects, depth, mean_face=mean_face)
+        learner.update(question.trial(rng))
         if trial in condition.marks and not (changed and trial == condition.change_at + 1):
-            found.append(success(learner.snapshot(), world[-TEST_LOOKS:], condition, seed))
+            test = _test(world, condition, seed, mean_face)
+            found.append(success(learner.snapshot(), test))
     return found
 
 
-def success(learner: Predictor, looks: Looks, condition: SensesTask, seed: int) -> float:
-    """Return how often the learner alone chooses the attended object, 0-1."""
-    rng = np.random.default_rng([seed, condition.objects, 1])
-    right = []
-    for index in range(len(looks)):
-        for _ in range(ARRANGEMENTS):
-            look, places, ranges, posture = _scene(rng, looks, index, condition)
-            delta = learner.propose(look, posture, places, ranges)
-            if delta is None:
-                right.append(1 / len(places))
-            else:
-                right.append(float(np.argmin(np.hypot(*(places - posture - delta).T)) == 0))
-    return float(np.mean(right))
+def _test(
+    looks: Looks, condition: SensesTask, seed: int, mean_face: MeanFace | None = None
+) -> Iterator[Question]:
+    tested = looks[-TEST_LOOKS:]
+    return draw_test(tested, condition.objects, seed, condition.depth, mean_face)
 
 
 def _looks(seed: int) -> Looks:
     return load_looks('default', seed, LOOKS, senses=True)
-
-
-def _scene(
-    rng: np.random.Generator, looks: Looks, index: int, condition: SensesTask
-) -> tuple[Look, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return a look, the directions of objects (n, 2), their ranges (n, 2), and the posture.
-
-    The attended object is the first.
-    """
-    posture = looks.postures[index]
-    places = posture + draw_places(rng, looks.directions[index] - posture, condition.objects)
-    ranges, face_range = unknown_ranges(len(places)), unknown_ranges(1)[0]
-    if condition.depth is not None:
-        others = rng.uniform(*_DISTANCES_M, len(places) - 1)
-        distances = np.append(looks.object_distances[index], others)
-        ranges = _measured(rng, distances, condition.depth)
-        face_range = _measured(rng, looks.face_distances[index : index + 1], condition.depth)[0]
-    look = Look(
-        looks.faces[index],
-        looks.faces_at[index],
-        face_range,
-        FaceGaze.from_row(looks.gazes[index]),
-    )
-    return look, places, ranges, posture
-
-
-def _measured(
-    rng: np.random.Generator, distances: NDArray[np.float64], share: float
-) -> NDArray[np.float64]:
-    found = distances * (1 + share * rng.normal(size=len(distances)))
-    return np.stack([found, share * found], axis=1)
