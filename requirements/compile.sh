@@ -23,6 +23,8 @@ for part in ros sim dashboard experiments dev docs; do
     "${compile[@]}" "$part.in" "${constraints[@]}" --output-file "$part.lock"
     constraints+=(--constraint "$part.lock")
 done
+"${compile[@]}" "${without[@]/#/--no-emit-package=}" ppo.in "${constraints[@]}" \
+    --constraint base.in --output-file ppo.lock
 {
     echo '# This file was made by requirements/compile.sh, which says why it has no hash.'
     grep '^torch==' base.in

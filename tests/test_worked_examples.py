@@ -37,4 +37,5 @@ def test_the_code_of_a_page_passes_its_own_tests(page: Path, tmp_path: Path) -> 
 
 
 def test_there_is_a_page_for_each_thing_to_change() -> None:
-    assert [page.stem for page in PAGES] == ['a_new_detector', 'a_new_head', 'a_new_learner']
+    things = ('benchmark_entry', 'detector', 'head', 'learner')
+    assert [page.stem for page in PAGES] == [f'a_new_{thing}' for thing in things]

@@ -20,15 +20,22 @@ EXAMPLES: dict[str, dict[str, str]] = {
     'figures': {
         './ja figures --trials 30000 --seeds 3': 'a tenth of the paper, in a minute',
         './ja figures --ablations 5 --output runs/paper': 'all, and what the paper leaves open',
+        './ja figures --values chosen': 'with the values that a sweep chose, not the first tried',
         './ja figures --data data/monday': 'on recorded faces (./ja export)',
     },
     'sweep': {
         './ja sweep grid.yaml --workers 2': 'a grid of experiments; the same line resumes it',
         './ja sweep grid.yaml --scheduler tcp://cluster:8786': 'on a Dask cluster',
     },
+    'score-learner': {
+        './ja score-learner': 'the baselines in every task of the benchmark',
+        'PYTHONPATH=. ./ja score-learner my_lab.nearest:Nearest --seeds 0-3': 'a learner of yours',
+        './ja score-learner ppo tabular --task five-objects --output runs/ppo': 'two, in one task',
+    },
     'bench': {
         './ja bench': 'everything; takes a while',
         './ja bench recording --json figures.json': 'one of them, for a script too',
+        './ja bench learning_speed --quick': 'in three minutes, on other caregivers',
     },
     'reference': {
         './ja reference': 'after a change of a topic or a parameter',

@@ -27,11 +27,14 @@ def bench(
     json_file: Annotated[
         Optional[Path], typer.Option('--json', help='Write the figures to this file.')
     ] = None,
+    quick: Annotated[
+        bool, typer.Option('--quick', help='The quick form, where a benchmark has one.')
+    ] = False,
 ) -> None:
     """Measure: a table of figures, each with its unit, count and interval."""
     from ja_benchmarks.run_benchmarks import run_benchmarks
 
-    sys.exit(run_benchmarks(name, json_file))
+    sys.exit(run_benchmarks(name, json_file, quick))
 
 
 def reference(

@@ -1,9 +1,10 @@
-"""The commands `figures` and `sweep`, for `./ja`."""
+"""The commands `figures`, `sweep` and `score-learner`, for `./ja`."""
 
 from __future__ import annotations
 
 import os
 import tempfile
+from enum import Enum
 from pathlib import Path
 from typing import Annotated, Optional
 
@@ -12,10 +13,18 @@ import typer
 _CORES = os.cpu_count() or 1
 
 
+class PaperValues(str, Enum):
+    """The values of the `VALUES` of the experiment."""
+
+    first = 'first'
+    chosen = 'chosen'
+
+
 def register(app: typer.Typer) -> None:
     """Add the commands to an app."""
     app.command()(figures)
     app.command()(sweep)
+    app.command('score-learner')(score_learner)
 
 
 def figures(
@@ -26,6 +35,13 @@ def figures(
         ),
     ] = 300_000,
     seeds: Annotated[int, typer.Option(min=1, help='Runs of each condition.')] = 10,
+    first_seed: Annotated[int, typer.Option(min=0, help='Seed of the first run.')] = 0,
+    values: Annotated[
+        PaperValues,
+        typer.Option(
+            help='Numbers that the paper does not give: the first tried, or chosen by a sweep.'
+        ),
+    ] = PaperValues.first,
     ablations: Annotated[int, typer.Option(min=0, help='Seeds of the ablations; 0: none.')] = 0,
     scene: Annotated[str, typer.Option(help='Scene of the sim, by name or file.')] = 'default',
     looks_seed: Annotated[int, typer.Option(min=0, help='Seed of the caregiver.')] = 0,
@@ -49,7 +65,8 @@ def figures(
     from ja_experiments.progress_bars import ProgressBars
 
     config = StudyConfig(
-        plan=Plan(trials=trials, seeds=tuple(range(seeds))),
+        plan=Plan(trials=trials, seeds=tuple(range(first_seed, first_seed + seeds))),
+        values=values.value,
         scene=scene,
         looks_seed=looks_seed,
         data=str(data or ''),
@@ -90,6 +107,65 @@ def sweep(
     folder = output or Path('runs') / f'sweep-{config.stem}'
     grid, progress = read_grid(config), ProgressBars()
     check_writable(folder)
-    materials = prepare_materials(grid.scene, looks_seed=0, progress=progress)
+    materials = prepare_materials(grid.scene, grid.looks_seed, progress)
     table = run_sweep(grid, materials, folder, progress, scheduler, workers)
     typer.echo(f'The results: {table}')
+
+
+def _baseline_names() -> list[str]:
+    from ja_experiments.learning_tasks.baselines import BASELINES
+
+    return list(BASELINES)
+
+
+def _task_names() -> list[str]:
+    from ja_experiments.learning_tasks.task_table import TASKS
+
+    return list(TASKS)
+
+
+def score_learner(
+    learners: Annotated[
+        Optional[list[str]],
+        typer.Argument(
+            help='MODULE:CLASS, or names of baselines; all of these but ppo without it.',
+            autocompletion=_baseline_names,
+        ),
+    ] = None,
+    task: Annotated[
+        Optional[list[str]],
+        typer.Option(
+            help='One of the tasks, may be repeated; all without it.', autocompletion=_task_names
+        ),
+    ] = None,
+    seeds: Annotated[
+        str, typer.Option(help='Seeds of caregiver and learner: 0-3,7. Default: for reports.')
+    ] = '10-14',
+    output: Annotated[Optional[Path], typer.Option(help='Folder of the scores.')] = None,
+) -> None:
+    """Score learners in the tasks of the benchmark, each alone on looks it never learned from."""
+    from rich.console import Console
+
+    from ja_common.core.files import check_writable
+    from ja_common.core.run_folder import new_run_folder
+    from ja_experiments.learning_tasks.baselines import find_entrant
+    from ja_experiments.learning_tasks.score_report import (
+        QUICK_BASELINES,
+        read_seeds,
+        score_all,
+        score_tables,
+        write_scores,
+    )
+    from ja_experiments.learning_tasks.task_table import TASKS, find_task
+
+    names, numbers = learners or list(QUICK_BASELINES), read_seeds(seeds)
+    tasks = [find_task(name).name for name in task or TASKS]
+    for name in names:
+        find_entrant(name)  # what cannot enter is found now, and not after minutes
+    folder = output or new_run_folder('scores')
+    check_writable(folder)
+    rows = score_all(names, tasks, numbers)
+    for table in score_tables(rows):
+        Console().print(table)
+    write_scores(rows, numbers, folder)
+    typer.echo(f'The scores: {folder}')
