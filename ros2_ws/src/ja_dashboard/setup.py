@@ -28,6 +28,7 @@ setup(
     extras_require={'test': ['pytest']},
     entry_points={
         'console_scripts': [
+            'markers = ja_dashboard.markers_node:main',
             'view = ja_dashboard.view_node:main',
         ],
     },

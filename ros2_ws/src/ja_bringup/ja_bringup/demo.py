@@ -19,6 +19,7 @@ def run_demo(
     arguments: Sequence[str],
     view: bool = False,
     resume: Path | None = None,
+    markers: bool = False,
 ) -> int:
     """Lead the graph through the stages of a course and print a summary; return the exit code.
 
@@ -43,6 +44,7 @@ def run_demo(
         over,
         one_process=one_process,
         view=view,
+        markers=markers,
         supervision=supervision,
         arguments=arguments,
         memory=resume,

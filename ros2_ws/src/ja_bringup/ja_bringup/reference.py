@@ -42,6 +42,7 @@ NODES = (
 )
 COMPANIONS = (
     NodeSpec('ja_dashboard', 'view'),
+    NodeSpec('ja_dashboard', 'markers'),
     NodeSpec('ja_recording', 'recorder'),
     NodeSpec('ja_recording', 'player'),
 )
@@ -60,7 +61,8 @@ Made by `./ja reference` from the code; do not edit. All names are relative (nam
 work) except `/clock` and `/diagnostics`. All messages that follow from an image carry its stamp
 unchanged. Every image gets one message on each topic of the loop, an empty one where there is no
 result. Beside the graph, `recorder` subscribes to every topic, `player` publishes what was
-recorded, and `view` subscribes to what it shows while the page is open.
+recorded, `view` subscribes to what it shows while the page is open, and `markers` to what it draws
+while `markers` has a subscriber.
 
 | topic | type | publishers | subscribers | QoS (publishers / subscribers) | what it is |
 |---|---|---|---|---|---|

@@ -110,6 +110,14 @@ class CameraInput:
         camera = self._calibration.camera(width, height, self.rectified)
         return None if camera is None else camera.turned(self.quarter_turns)
 
+    def full_view(self) -> CameraModel | None:
+        """Return the camera of upright pictures of the calibrated size, without a picture.
+
+        None where it is not calibrated. Raises ValueError where the calibration is impossible.
+        """
+        camera = self._calibration and self._calibration.full_view(self.rectified)
+        return camera and camera.turned(self.quarter_turns)
+
     def upright_header(self, header: Header) -> Header:
         """Return the header of what is measured in the upright picture.
 

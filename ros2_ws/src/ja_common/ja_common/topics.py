@@ -14,6 +14,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState, PointCloud2
 from std_msgs.msg import Float32, Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory
+from visualization_msgs.msg import MarkerArray
 
 
 def _qos(reliable: bool, depth: int, latched: bool = False) -> QoSProfile:
@@ -169,6 +170,12 @@ ROBOT_DESCRIPTION = Topic(
 )
 GATE_STATUS = Topic(
     'gate/status', DiagnosticStatus, 'phase, source, p(LM), limits, reason of a hold', **_LINK
+)
+MARKERS = Topic(
+    'markers',
+    MarkerArray,
+    'rays, labels, field of view, belief and directions for RViz and Foxglove; while subscribed',
+    **_LINK,
 )
 DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, 'health of every node, 1 Hz', **_LINK)
 LOG = Topic(

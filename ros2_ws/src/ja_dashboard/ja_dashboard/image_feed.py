@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,12 +17,10 @@ from ja_common.core.camera_model import CameraModel
 from ja_common.core.detection import Detection
 from ja_common.core.fixation import WIDTH_SIXTH
 from ja_common.core.geometry import directions_of_rays
-from ja_common.detection_codec import decode_detections
 from ja_common.face_gaze_codec import decode_face_gaze
 from ja_common.graph_node import GraphNode
 from ja_common.image_codec import decode_image
 from ja_common.joint_codec import JointCodec
-from ja_common.point_cloud_codec import decode_columns
 from ja_common.polled_subscription import PolledSubscription
 from ja_common.posture_reader import PostureReader
 from ja_common.time_codec import to_ns
@@ -42,6 +40,7 @@ from ja_common.topics import (
     VF_DELTA,
     Topic,
 )
+from ja_dashboard.bounded_clouds import finite_columns, shown_detections
 from ja_dashboard.core.gaze_view import GazeView, draw_gaze
 from ja_dashboard.core.view_model import SceneView, TruthView, ViewModel
 
@@ -62,7 +61,6 @@ _STEPS = (DETECTIONS, VF_DELTA, LM_DELTA, FIXATION, JOINT_COMMANDS)
 _ASSUMED_VIEW_RAD = math.radians(36)
 _JPEG_QUALITY = 80
 _MOST_PX = 8192
-_MOST_POINTS = 2000
 LIMITS = ('pan_min_rad', 'tilt_min_rad', 'pan_max_rad', 'tilt_max_rad')
 """The gate's parameters, in the order of (low, high)."""
 
@@ -200,11 +198,11 @@ class ImageFeed:
             self._command = self._last_command
 
     def _on_belief(self, message: PointCloud2) -> None:
-        columns = _shown_columns(message, ('pan', 'tilt', 'weight'))
+        columns = finite_columns(message, ('pan', 'tilt', 'weight'))
         self._belief = np.column_stack(list(columns.values())).astype(float)
 
     def _on_truth(self, message: PointCloud2) -> None:
-        c = _shown_columns(message, ('x', 'y', 'z', 'pan', 'tilt', 'attended'))
+        c = finite_columns(message, ('x', 'y', 'z', 'pan', 'tilt', 'attended'))
         attended = np.flatnonzero(c['attended'])
         self._truth = TruthView(
             np.column_stack([c['x'], c['y'], c['z']]).astype(float),
@@ -245,7 +243,7 @@ class ImageFeed:
     ) -> None:
         _check_size(message)
         image = self._camera.decode(message)
-        detections: list[Detection] = self._decoded(DETECTIONS, _shown_detections, found) or []
+        detections: list[Detection] = self._decoded(DETECTIONS, shown_detections, found) or []
         face_image = None if face is None else self._decoded(FACE_IMAGE, _shown_image, face)
         camera = self._camera_of(image)
         latency_s = self.latencies_ms.get(DETECTIONS.name, 0.0) / 1e3
@@ -294,25 +292,5 @@ def _check_size(message: Image) -> None:
         )
 
 
-def _shown_detections(message: PointCloud2) -> list[Detection]:
-    _check_count(message)
-    return decode_detections(message)
-
-
 def _shown_points(message: PointCloud2) -> NDArray[np.float64]:
-    return np.column_stack(list(_shown_columns(message, ('u', 'v')).values())).astype(float)
-
-
-def _shown_columns(message: PointCloud2, names: Sequence[str]) -> dict[str, NDArray[np.float32]]:
-    """Decode columns of a cloud that can be drawn: not too many points, all of them finite."""
-    _check_count(message)
-    columns = decode_columns(message, names)
-    if not all(np.isfinite(column).all() for column in columns.values()):
-        raise ValueError('the point cloud holds numbers that are not finite')
-    return columns
-
-
-def _check_count(message: PointCloud2) -> None:
-    count = message.width * message.height
-    if count > _MOST_POINTS:
-        raise ValueError(f'the page draws up to {_MOST_POINTS} points, not {count}')
+    return np.column_stack(list(finite_columns(message, ('u', 'v')).values())).astype(float)

@@ -30,6 +30,9 @@ _MEMORY = {
     'gate': {'trials_file': 'trials'},
 }
 
+_COMPANIONS = {'view': 'is no live page', 'markers': 'are no markers'}
+"""The nodes of the dashboard, and what is missing without it."""
+
 
 def run_graph(
     graph: Sequence[NodeSpec],
@@ -39,6 +42,7 @@ def run_graph(
     *,
     one_process: bool = False,
     view: bool = False,
+    markers: bool = False,
     supervision: Supervision = DEFAULT,
     arguments: Sequence[str] = (),
     memory: Path | None = None,
@@ -50,7 +54,8 @@ def run_graph(
     `arguments`: the ROS arguments of all nodes (the progress node gets the namespace as well).
     `memory`: the folder in which learner and gate save what they learned, and from which they
     resume if it is there; by default `folder`.
-    `view`: serve the live page beside the graph, in its own process.
+    `view`: serve the live page beside the graph, in its own process. `markers`: the same for the
+    markers of RViz and Foxglove.
     """
     apply_ros_defaults()
     check_ros_arguments(arguments)
@@ -58,7 +63,11 @@ def run_graph(
     for place in {folder, memory or folder}:
         check_writable(place)
     graph = [_with_memory(spec, (memory or folder).absolute()) for spec in graph]
-    beside_graph = [NodeSpec('ja_dashboard', 'view', arguments=arguments)] if view else []
+    beside_graph = [
+        NodeSpec('ja_dashboard', name, arguments=arguments)
+        for name, wanted in (('view', view), ('markers', markers))
+        if wanted
+    ]
     unread = check_parameter_files(full_names([*graph, *beside_graph]), arguments)
     progress: list[ProgressNode] = []
 
@@ -70,17 +79,20 @@ def run_graph(
     with claim_names(graph), Display(title) as display, ExitStack() as beside:
         for sentence in unread:
             display.print_line(f'warning: {sentence}')
-        page: Companion | None = None
-        if view and not is_installed('ja_dashboard'):
-            display.print_line('there is no live page: the dashboard is not installed')
-        elif view:
-            page = Companion(beside_graph[0], folder / 'log', display.print_line, LIVE_PAGE)
-            beside.enter_context(page)
+        companions: list[Companion] = []
+        for spec in beside_graph:
+            name = _COMPANIONS[spec.executable]
+            if not is_installed('ja_dashboard'):
+                display.print_line(f'there {name}: the dashboard is not installed')
+                continue
+            announcement = LIVE_PAGE if spec.executable == 'view' else ''
+            companion = Companion(spec, folder / 'log', display.print_line, announcement)
+            companions.append(beside.enter_context(companion))
 
         def is_done() -> bool:
             display.update(progress[0])
-            if page is not None:
-                page.report_events()
+            for companion in companions:
+                companion.report_events()
             return display.reader_has_gone or done(progress[0])
 
         if one_process:

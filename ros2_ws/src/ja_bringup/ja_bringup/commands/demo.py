@@ -9,6 +9,7 @@ import typer
 
 from ja_bringup.commands.options import (
     HungAfter,
+    Markers,
     OnDeath,
     OnDeathChoice,
     OneProcess,
@@ -85,6 +86,7 @@ def demo(
     record: Record = False,
     one_process: OneProcess = False,
     view: View = True,
+    markers: Markers = False,
     on_death: OnDeath = OnDeathChoice.stop,
     hung_after_s: HungAfter = Supervision.hung_after_s,
 ) -> None:
@@ -103,4 +105,4 @@ def demo(
     stages = standard_course(trials or PRACTICE_TRIALS[learner.value], time_s, exam_trials)
     graph = with_arguments([*[RECORDER] * record, *graph], arguments)
     supervision = Supervision(on_death.value, hung_after_s)
-    sys.exit(run_demo(graph, stages, one_process, supervision, arguments, view, resume))
+    sys.exit(run_demo(graph, stages, one_process, supervision, arguments, view, resume, markers))

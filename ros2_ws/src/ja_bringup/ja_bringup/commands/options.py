@@ -32,6 +32,12 @@ Senses = Annotated[
     ),
 ]
 View = Annotated[bool, typer.Option(help='Serve the live page, and print its address.')]
+Markers = Annotated[
+    bool,
+    typer.Option(
+        '--markers', help='Publish `markers` for RViz and Foxglove, while one of them reads them.'
+    ),
+]
 Swap = Annotated[
     Optional[list[str]],
     typer.Option(

@@ -7,6 +7,7 @@ import typer
 
 from ja_bringup.commands.options import (
     HungAfter,
+    Markers,
     OnDeath,
     OnDeathChoice,
     OneProcess,
@@ -42,6 +43,7 @@ def rig(
     record: Record = False,
     one_process: OneProcess = False,
     view: View = True,
+    markers: Markers = False,
     on_death: OnDeath = OnDeathChoice.stop,
     hung_after_s: HungAfter = Supervision.hung_after_s,
 ) -> None:
@@ -58,6 +60,7 @@ def rig(
         lambda node: 0.0 < time_s < node.elapsed_s,
         one_process=one_process,
         view=view,
+        markers=markers,
         supervision=Supervision(on_death.value, hung_after_s),
         arguments=arguments,
     )

@@ -43,6 +43,14 @@ class CameraCalibration:
         camera = self._full_camera(width, height, rectified)
         return None if camera is None else self._fit(camera, width, height)
 
+    def full_view(self, rectified: bool = False) -> CameraModel | None:
+        """Return the camera of images of the calibrated size; None where that is not known.
+
+        Raises ``ValueError`` as ``camera``.
+        """
+        camera = self._full_camera(*self.size, rectified) if all(self.size) else None
+        return None if camera is None else self._window(camera)
+
     def check(self, rectified: bool = False) -> bool:
         """Return whether the camera is calibrated. Raises ``ValueError`` as ``camera``."""
         width, height = self.size
