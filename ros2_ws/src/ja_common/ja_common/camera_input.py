@@ -115,8 +115,10 @@ class CameraInput:
 
         None where it is not calibrated. Raises ValueError where the calibration is impossible.
         """
-        camera = self._calibration and self._calibration.full_view(self.rectified)
-        return camera and camera.turned(self.quarter_turns)
+        if self._calibration is None:
+            return None
+        camera = self._calibration.full_view(self.rectified)
+        return None if camera is None else camera.turned(self.quarter_turns)
 
     def upright_header(self, header: Header) -> Header:
         """Return the header of what is measured in the upright picture.
