@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from drawn_faces import drawn_face
 from ja_common.core.config import ConfigError
 from ja_common.core.weight_files import note_weight_files
 from ja_learning.core import others_face_code as others
@@ -20,14 +21,6 @@ from ja_learning.core.trial import MeanFace, Trial
 
 FIELD = np.array([0.6, 0.25])
 LOOK = np.array([0.1, -0.05])
-
-
-def drawn_face(gaze: np.ndarray) -> np.ndarray:
-    """Draw a face whose nose, a dark spot, moves with the gaze (left, down) [rad]."""
-    rows, columns = np.mgrid[0:30, 0:25]
-    column, row = 12 - 8 * gaze[0] / 0.7, 15 + 8 * gaze[1] / 0.3
-    spot = np.exp(-((rows - row) ** 2 + (columns - column) ** 2) / 20)
-    return (200 - 150 * spot).astype(np.uint8)
 
 
 def made_trial(rng: np.random.Generator, objects: int = 4) -> tuple[Trial, int]:

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from drawn_faces import drawn_face
 from ja_learning.core.contrast_memory import ContrastMemory
 from ja_learning.core.eigenface_posterior import EigenfacePosterior
 from ja_learning.core.eigenfaces import COMPONENTS, Eigenfaces
@@ -16,14 +17,6 @@ from ja_learning.core.trial import Look, Trial
 
 LOOK = np.array([0.1, -0.05])
 CONFIG = GazeLineConfig(members=2, channels=4, first_guess='eigenfaces')
-
-
-def drawn_face(gaze: np.ndarray) -> np.ndarray:
-    """Draw a face whose nose, a dark spot, moves with the gaze (left, down) [rad]."""
-    rows, columns = np.mgrid[0:30, 0:25]
-    column, row = 12 - 8 * gaze[0] / 0.7, 15 + 8 * gaze[1] / 0.3
-    spot = np.exp(-((rows - row) ** 2 + (columns - column) ** 2) / 20)
-    return (200 - 150 * spot).astype(np.uint8)
 
 
 def made_trial(rng: np.random.Generator, objects: int = 4) -> tuple[Trial, int]:

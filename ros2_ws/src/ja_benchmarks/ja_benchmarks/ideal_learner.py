@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ja_benchmarks.ceiling import draw_arrangements, draw_heads, draw_looked_at, heads_towards
 from ja_common.core.geometry import directions_of_vectors
+from ja_learning.core.particles import effective_count, resampled
 from ja_sim.core.scene import Scene
 
 READING_ERROR_RAD = float(np.radians(0.5))
@@ -134,12 +135,12 @@ class IdealLearner:
 
     def maps(self, count: int = 1000) -> NDArray[np.float64]:
         """Return so many maps (count, 6) of equal weight."""
-        return np.asarray(self._maps[_resampled(self._log_weights, self._rng, count)])
+        return np.asarray(self._maps[resampled(self._log_weights, self._rng, count)])
 
     def _resample_and_move(self, newest_power: float) -> None:
         """Resample, and move the maps so that they stay distributed as the tempered posterior."""
         count = len(self._maps)
-        maps = self._maps[_resampled(self._log_weights, self._rng, count)]
+        maps = self._maps[resampled(self._log_weights, self._rng, count)]
         powers = np.append(np.ones(len(self._readings) - 1), newest_power)
 
         def log_posterior(proposed: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -234,16 +235,5 @@ def _largest_step(
 
 
 def _effective_share(log_weights: NDArray[np.float64]) -> float:
-    """Return what share of maps of equal weight would be worth as much (Kong 1992)."""
-    weights = np.exp(log_weights - log_weights.max())
-    return float(weights.sum() ** 2 / (weights**2).sum() / len(weights))
-
-
-def _resampled(
-    log_weights: NDArray[np.float64], rng: np.random.Generator, count: int
-) -> NDArray[np.integer]:
-    """Return so many indices, each as often as its weight demands (systematic resampling)."""
-    weights = np.exp(log_weights - log_weights.max())
-    places = (rng.random() + np.arange(count)) / count
-    found = np.searchsorted(np.cumsum(weights / weights.sum()), places)
-    return np.minimum(found, len(log_weights) - 1)
+    """Return what share of maps of equal weight would be worth as much."""
+    return effective_count(log_weights) / len(log_weights)

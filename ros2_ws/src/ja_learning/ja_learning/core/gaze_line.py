@@ -33,6 +33,7 @@ from ja_learning.core.contrast_memory import CONTRAST, ContrastMemory
 from ja_learning.core.eigenface_posterior import GUESS_BEGINS, EigenfacePosterior
 from ja_learning.core.evidence import ChangeAlarm, Evidence
 from ja_learning.core.face_code import OTHERS, WATCHED, FaceCode, load_face_code
+from ja_learning.core.face_warps import warped
 from ja_learning.core.gaze_line_belief import AnswersFromSnapshot, GazeLineBelief
 from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_learning.core.gaze_line_network import GazeLineNetwork, give_member
@@ -51,8 +52,8 @@ _MOST_STEPS = 2.0**24
 # With how many negatives the places of a trial are compared: in each training step, drawn again;
 # to weigh a trial, once, where the effect of the draw would be taken for evidence.
 _TRAINING_NEGATIVES, _WEIGHING_NEGATIVES = 64, 256
-# Augmentation of a replayed face: its size (a share), its place, its pixels (in deviations).
-_AUGMENTED_SIZE, _AUGMENTED_PLACE_PIXELS, _AUGMENTED_LIGHT = 0.1, 1.0, 0.3
+# Augmentation of a replayed face: its size (a share), as another look would show it.
+_AUGMENTED_SIZE = 0.1
 # So far soft labels of the first guess are trusted, which may be wrong.
 _GUESSED = 0.85
 # The guess about old trials becomes better with the new ones.
@@ -263,7 +264,8 @@ class GazeLineLearner(AnswersFromSnapshot):
         ages[0] = 0
         faces, places = self._memory.trials_at(ages)
         loss = self._loss(
-            self._augmented(torch.from_numpy(faces)),
+            # Without this every member overfits the remembered faces, and the evidence falls.
+            warped(torch.from_numpy(faces), _AUGMENTED_SIZE, self._random),
             torch.from_numpy(places).transpose(0, 1),
             self._log_prior(ages, places),
             inverse_temperature,
@@ -283,26 +285,6 @@ class GazeLineLearner(AnswersFromSnapshot):
         slope = self._network.origin_tilt.grad
         if slope is not None:
             slope[inverse_temperature < 1.0] = 0.0
-
-    def _augmented(self, faces: torch.Tensor) -> torch.Tensor:
-        """Vary each of faces (n, members, 30, 25) a little, as another look would show it.
-
-        Without it every member overfits the remembered faces, and the evidence falls.
-        """
-        pictures = faces.reshape(-1, 1, *faces.shape[-2:])
-        scale, *shift = 2 * torch.rand((3, len(pictures)), generator=self._random) - 1
-        maps = torch.zeros(len(pictures), 2, 3)
-        maps[:, 0, 0] = maps[:, 1, 1] = 1 + _AUGMENTED_SIZE * scale
-        # In units of half a picture, x before y.
-        for axis, pixels in enumerate((faces.shape[-1], faces.shape[-2])):
-            maps[:, axis, 2] = 2 / pixels * _AUGMENTED_PLACE_PIXELS * shift[axis]
-        grid = nn.functional.affine_grid(maps, list(pictures.shape), align_corners=False)
-        moved = nn.functional.grid_sample(
-            pictures, grid, padding_mode='border', align_corners=False
-        )
-        return moved.reshape(faces.shape) + _AUGMENTED_LIGHT * torch.randn(
-            faces.shape, generator=self._random
-        )
 
     def _draw_negatives(self, count: int) -> torch.Tensor:
         """Draw places (members, count, 8) that were seen in any of the trials remembered."""

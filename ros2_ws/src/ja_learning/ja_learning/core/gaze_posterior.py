@@ -18,6 +18,7 @@ from ja_learning.core.checkpoint_arrays import counts, numbers
 from ja_learning.core.compiled import compiled
 from ja_learning.core.gaze_features import Features
 from ja_learning.core.gaze_table import LEVELS, look_up
+from ja_learning.core.particles import effective_count, resampled
 from ja_learning.core.seen_trials import SeenTrials
 
 PARTICLES = 400
@@ -72,9 +73,9 @@ class GazePosterior:
 
     def move_where_needed(self, trials: SeenTrials, random: np.random.Generator) -> None:
         """Resample and move the maps if few of them carry the weight; `trials`: all so far."""
-        if _effective_count(self._log_weights) >= _MOVED_BELOW * PARTICLES:
+        if effective_count(self._log_weights) >= _MOVED_BELOW * PARTICLES:
             return
-        maps = self._maps.chosen(_resampled(self._log_weights, random, PARTICLES))
+        maps = self._maps.chosen(resampled(self._log_weights, random, PARTICLES))
         self._maps = self._moved(maps, trials, random)
         self._log_weights = np.zeros(PARTICLES)
 
@@ -86,7 +87,7 @@ class GazePosterior:
 
     def doubt_half(self, trials: SeenTrials, random: np.random.Generator) -> None:
         """Draw half of the maps anew, and weigh all by these trials only: the world changed."""
-        kept = self._maps.chosen(_resampled(self._log_weights, random, PARTICLES // 2))
+        kept = self._maps.chosen(resampled(self._log_weights, random, PARTICLES // 2))
         fresh = self._drawn(random, PARTICLES - PARTICLES // 2)
         both = (np.concatenate(pair) for pair in zip(kept, fresh, strict=True))
         self._maps, self._log_weights = Maps(*both), np.zeros(PARTICLES)
@@ -100,7 +101,7 @@ class GazePosterior:
 
     def sample(self, random: np.random.Generator, count: int) -> Maps:
         """Return so many maps of equal weight, the likeliest in front of them."""
-        chosen = _resampled(self._log_weights, random, count)
+        chosen = resampled(self._log_weights, random, count)
         return self._maps.chosen(np.append(np.argmax(self._log_weights), chosen))
 
     def state(self) -> dict[str, NDArray[Any]]:
@@ -169,22 +170,6 @@ def _log_ratios(gazes, levels, none, tables, counts, chance):  # type: ignore[no
             ratio = look_up(tables[t], levels[p], pan, tilt) / max(by_chance, 1e-12)
             found[p, t] = math.log((1 - none[p]) * ratio + none[p])
     return found
-
-
-def _resampled(
-    log_weights: NDArray[np.float64], random: np.random.Generator, count: int
-) -> NDArray[np.integer]:
-    """Return so many indices, each as often as its weight demands (systematic resampling)."""
-    weights = np.exp(log_weights - log_weights.max())
-    places = (random.random() + np.arange(count)) / count
-    found = np.searchsorted(np.cumsum(weights / weights.sum()), places)
-    return np.minimum(found, len(log_weights) - 1)
-
-
-def _effective_count(log_weights: NDArray[np.float64]) -> float:
-    """Return how many particles of equal weight would be worth as much (Kong 1992)."""
-    weights = np.exp(log_weights - log_weights.max())
-    return float(weights.sum() ** 2 / (weights**2).sum())
 
 
 def _mirrored(maps: Maps, random: np.random.Generator) -> Maps:

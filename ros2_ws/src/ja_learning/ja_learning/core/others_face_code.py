@@ -20,6 +20,7 @@ from ja_learning.core.mean_face import contrasts
 
 _MEMBERS, _STEPS, _BATCH, _STEP_SIZE, _WEIGHT_DECAY = 3, 1500, 48, 0.003, 0.5
 _NEGATIVES, _NONE_ATTENDED = 64, 0.05
+_WARPED_SIZE = 0.08
 # Annealing, as in `gaze_line`, takes this share of the steps; the running mean of the weights
 # begins after so many.
 _INITIAL_INVERSE_TEMPERATURE, _ANNEALED = 0.1, 0.4
@@ -72,8 +73,7 @@ def others_face_code(caregivers: Sequence[OtherCaregiver], seconds: float, seed:
         inverse_temperature = min(1.0, _INITIAL_INVERSE_TEMPERATURE + 0.9 * progress)
         chosen = torch.randint(len(faces), (_BATCH, _MEMBERS), generator=generator)
         negatives = seen[torch.randint(len(seen), (_MEMBERS, _NEGATIVES), generator=generator)]
-        pictures = warped(faces[chosen].reshape(-1, 1, *faces.shape[1:]), generator)
-        gaze = network.gaze(pictures.reshape(*chosen.shape, *faces.shape[1:]))
+        gaze = network.gaze(warped(faces[chosen], _WARPED_SIZE, generator))
         ratio = network.log_ratio(gaze, places[chosen].transpose(0, 1), negatives)
         loss = _loss(ratio, inverse_temperature)
         optimiser.zero_grad()

@@ -21,6 +21,7 @@ from ja_learning.core.trial import FACE_SHAPE
 _MEMBERS, _STEPS, _BATCH, _STEP_SIZE = 3, 600, 64, 0.003
 _CODER_DECAY, _PICTURE_DECAY = 0.1, 0.01
 _SMALLEST = 1e-3
+_WARPED_SIZE = 0.08
 
 
 def watched_face_code(pictures: NDArray[np.uint8], seconds: float, seed: int) -> FaceCode:
@@ -50,7 +51,7 @@ def watched_face_code(pictures: NDArray[np.uint8], seconds: float, seed: int) ->
     )
     for _ in range(_STEPS):
         chosen = faces[torch.randint(len(faces), (_BATCH,), generator=generator)]
-        seen = warped(chosen + mean, generator) - mean
+        seen = warped(chosen + mean, _WARPED_SIZE, generator) - mean
         loss = _errors(predictor(network.gaze(seen)), chosen)
         optimiser.zero_grad()
         loss.sum().backward()
