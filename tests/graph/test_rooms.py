@@ -16,6 +16,7 @@ MAY_IMPORT = {
     'ja_recording': {'ja_common', *MIDDLE},
     'ja_dashboard': {'ja_common'},
     'ja_calibration': {'ja_common', 'ja_control'},
+    'ja_caregiver': {'ja_common', 'ja_perception', 'ja_sim'},
     'ja_runner': {'ja_common'},
 }
 MAY_IMPORT['ja_experiments'] = {'ja_common', *MIDDLE, 'ja_recording'}

@@ -193,6 +193,12 @@ SUCCESS_RATE = Topic(
     'sim/success_rate', Float32, 'share of recent trials with joint attention', **_LATCHED
 )
 SCORE = Topic('sim/score', DiagnosticStatus, 'the score in full, after every trial', **_LATCHED)
+CAREGIVER_REQUEST = Topic(
+    'caregiver/request',
+    DiagnosticStatus,
+    'what a real caregiver is asked to look at, the numbered things, the score: for the page only',
+    **_LATCHED,
+)
 
 EVERY_SCORE = replace(
     SCORE, subscriber_qos=QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -1,0 +1,1 @@
+"""Requests, schedules, scores and photographs of a real caregiver, without ROS."""
