@@ -14,6 +14,7 @@ from ja_learning.core.gaze_table import (
     gaze_table,
     level_mixture,
     look_up,
+    look_up_place,
 )
 from ja_learning.core.trial import Look
 
@@ -50,6 +51,17 @@ def test_between_its_nodes_it_is_interpolated_and_beyond_it_stays():
     assert middle == pytest.approx(table[0, :2, :2].mean())
     assert look_up(table, 1, -9.0, -9.0) == table[1, 0, 0]
     assert look_up(table, 1, 9.0, 9.0) == pytest.approx(table[1, -1, -1], rel=1e-3)
+
+
+@pytest.mark.parametrize('ranges', [None, np.array([[0.8, 0.02], [0.9, 0.03]])])
+def test_a_place_alone_is_looked_up_as_in_its_table(ranges: np.ndarray | None):
+    places = seen_places(LOOK, DIRECTIONS, ranges)
+    gazes = np.random.default_rng(0).normal(size=(50, 2)) * [1.5, 0.8]  # some beyond the edges
+    for place in places:
+        table = gaze_table(place[None])
+        for level in range(len(LEVELS)):
+            for pan, tilt in gazes:
+                assert look_up_place(place, level, pan, tilt) == look_up(table, level, pan, tilt)
 
 
 def test_without_candidates_a_table_is_zero():

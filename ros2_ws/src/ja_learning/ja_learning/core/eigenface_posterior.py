@@ -88,6 +88,14 @@ class EigenfacePosterior:
         assert self._tables is not None
         return self._posterior.log_ratios(self._tables.seen(faces, places))
 
+    def log_ratios_of_places(
+        self, face: NDArray[np.float32], places: NDArray[np.floating]
+    ) -> NDArray[np.float64]:
+        """Return log p, (m,), of each of places (m, 8) alone given a face, relative to chance."""
+        assert self._tables is not None
+        chance = self._tables.chance()
+        return self._posterior.log_ratios_of_places(self.features(face[None]), places, chance)
+
     def state(self) -> dict[str, NDArray[Any]]:
         """Return everything that trials have changed, as named arrays."""
         arrays: dict[str, NDArray[Any]] = {'eigenfaces.trials': np.array(self.trials)}

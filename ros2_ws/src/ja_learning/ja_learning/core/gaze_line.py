@@ -504,7 +504,7 @@ def _candidate_shares(
     alike = 1 / max(len(places), 1)
     if not guess.is_known:
         return np.full(len(places), alike, np.float32)
-    each = np.array([guess.log_ratios(face[None], place[None])[0] for place in places])
+    each = guess.log_ratios_of_places(face, places)
     shares = np.exp(each - each.max(initial=-np.inf))
     shares /= shares.sum()
     return (_GUESSED * shares + (1 - _GUESSED) * alike).astype(np.float32)

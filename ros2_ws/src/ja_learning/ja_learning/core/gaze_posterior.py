@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ja_learning.core.checkpoint_arrays import counts, numbers
 from ja_learning.core.compiled import compiled
 from ja_learning.core.gaze_features import Features
-from ja_learning.core.gaze_table import LEVELS, look_up
+from ja_learning.core.gaze_table import LEVELS, look_up, look_up_place
 from ja_learning.core.particles import effective_count, resampled
 from ja_learning.core.seen_trials import SeenTrials
 
@@ -99,6 +99,19 @@ class GazePosterior:
         total: NDArray[np.float64] = np.logaddexp.reduce(each, axis=0)
         return total - np.logaddexp.reduce(self._log_weights)
 
+    def log_ratios_of_places(
+        self, face: Features, places: NDArray[np.floating], chance: NDArray[np.float32]
+    ) -> NDArray[np.float64]:
+        """Return log p, (m,), of each of places (m, 8) alone, relative to chance.
+
+        `face`: the features of the one face with which they were seen; `chance`: as in
+        `SeenTrials`.
+        """
+        maps, seen = self._maps, np.ascontiguousarray(places, np.float64)
+        each = _log_ratios_of_places(maps.gazes(face)[:, 0], maps.levels, maps.none, seen, chance)
+        total: NDArray[np.float64] = np.logaddexp.reduce(each + self._log_weights[:, None], axis=0)
+        return total - np.logaddexp.reduce(self._log_weights)
+
     def sample(self, random: np.random.Generator, count: int) -> Maps:
         """Return so many maps of equal weight, the likeliest in front of them."""
         chosen = resampled(self._log_weights, random, count)
@@ -169,6 +182,18 @@ def _log_ratios(gazes, levels, none, tables, counts, chance):  # type: ignore[no
             by_chance = counts[t] * look_up(chance, levels[p], pan, tilt)
             ratio = look_up(tables[t], levels[p], pan, tilt) / max(by_chance, 1e-12)
             found[p, t] = math.log((1 - none[p]) * ratio + none[p])
+    return found
+
+
+@compiled
+def _log_ratios_of_places(gazes, levels, none, places, chance):  # type: ignore[no-untyped-def]
+    found = np.empty((len(levels), len(places)))
+    for p in range(len(levels)):
+        pan, tilt = gazes[p]
+        by_chance = max(look_up(chance, levels[p], pan, tilt), 1e-12)
+        for m in range(len(places)):
+            ratio = look_up_place(places[m], levels[p], pan, tilt) / by_chance
+            found[p, m] = math.log((1 - none[p]) * ratio + none[p])
     return found
 
 

@@ -89,29 +89,34 @@ def level_mixture(levels: NDArray[np.int64]) -> LineMixture[NDArray[np.float64]]
 
 def gaze_table(places: NDArray[np.floating]) -> NDArray[np.float32]:
     """Return S(u), of `SHAPE`, of places (m, 8) as in `gaze_line_places`."""
-    table = _table(np.ascontiguousarray(places, np.float64))
-    # Multiples of a power of two: sums of tables are exact, in any order.
-    return np.asarray(np.round(table / _UNIT) * _UNIT, np.float32)
+    return np.asarray(_table(np.ascontiguousarray(places, np.float64)), np.float32)
 
 
 @compiled
 def _table(places):  # type: ignore[no-untyped-def]
     found = np.zeros((len(_DEVIATIONS), len(_PANS), len(_TILTS)))
     for level in range(len(_DEVIATIONS)):
-        of_gaze = _DEVIATIONS[level] ** 2
-        for m in range(len(places)):
-            row = places[m]
-            for i in range(len(_PANS)):
-                for j in range(len(_TILTS)):
-                    if np.isnan(row[4]):
-                        found[level, i, j] += _on_line(
-                            row, _PANS[i], _TILTS[j], of_gaze, _OF_PLACE[level], _SHARES[level]
-                        )
-                    else:
-                        found[level, i, j] += _FACTORS[level] * _from_eyes(
-                            row, _PANS[i], _TILTS[j], of_gaze, _OF_PLACE[level]
-                        )
+        for i in range(len(_PANS)):
+            for j in range(len(_TILTS)):
+                for m in range(len(places)):
+                    found[level, i, j] += _of_place(places[m], level, i, j)
+                found[level, i, j] = _rounded(found[level, i, j])
     return found
+
+
+@njit(nogil=True)
+def _rounded(value):  # type: ignore[no-untyped-def]
+    """Return a multiple of a power of two: sums of tables are exact, in any order."""
+    return np.float32(np.rint(value / _UNIT) * _UNIT)
+
+
+@njit(nogil=True)
+def _of_place(row, level, i, j):  # type: ignore[no-untyped-def]
+    """Return p(c | u) of a place (8,) at one node of the table."""
+    of_gaze, of_place = _DEVIATIONS[level] ** 2, _OF_PLACE[level]
+    if np.isnan(row[4]):
+        return _on_line(row, _PANS[i], _TILTS[j], of_gaze, of_place, _SHARES[level])
+    return _FACTORS[level] * _from_eyes(row, _PANS[i], _TILTS[j], of_gaze, of_place)
 
 
 @njit(nogil=True)
@@ -145,11 +150,34 @@ def _from_eyes(row, pan, tilt, of_gaze, of_place):  # type: ignore[no-untyped-de
 @njit(nogil=True)
 def look_up(table, level, pan, tilt):  # type: ignore[no-untyped-def]
     """Return one value of a table, between its nodes; beyond its edges that of the edge."""
-    x = min(max((pan + PAN_MOST) / STEP, 0.0), len(_PANS) - 1.001)
-    y = min(max((tilt + TILT_MOST) / STEP, 0.0), len(_TILTS) - 1.001)
-    i, j = int(x), int(y)
-    x, y = x - i, y - j
+    i, j, x, y = _cell(pan, tilt)
     near = table[level]
     return (1 - x) * ((1 - y) * near[i, j] + y * near[i, j + 1]) + x * (
         (1 - y) * near[i + 1, j] + y * near[i + 1, j + 1]
     )
+
+
+@njit(nogil=True)
+def look_up_place(place, level, pan, tilt):  # type: ignore[no-untyped-def]
+    """Return what `look_up` finds in the table of a single place (8,), without making the table.
+
+    A cloud of maps asks a few hundred gazes; a table has thousands of nodes.
+    """
+    i, j, x, y = _cell(pan, tilt)
+    near, nearer = (
+        _rounded(_of_place(place, level, i, j)),
+        _rounded(_of_place(place, level, i, j + 1)),
+    )
+    far, farther = (
+        _rounded(_of_place(place, level, i + 1, j)),
+        _rounded(_of_place(place, level, i + 1, j + 1)),
+    )
+    return (1 - x) * ((1 - y) * near + y * nearer) + x * ((1 - y) * far + y * farther)
+
+
+@njit(nogil=True)
+def _cell(pan, tilt):  # type: ignore[no-untyped-def]
+    """Return the node below a gaze, and how far the gaze is beyond it, in steps."""
+    x = min(max((pan + PAN_MOST) / STEP, 0.0), len(_PANS) - 1.001)
+    y = min(max((tilt + TILT_MOST) / STEP, 0.0), len(_TILTS) - 1.001)
+    return int(x), int(y), x - int(x), y - int(y)
