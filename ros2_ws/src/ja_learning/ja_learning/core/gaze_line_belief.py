@@ -69,7 +69,7 @@ class GazeLineBelief:
             return None
         aim = coded.best_guess
         if self._top_down and len(places := seen_places(look, candidates, ranges)):
-            density = self._mixed(coded, places)[0]
+            density = self._density(coded, places)
             best = int(np.argmax(density))
             if density[best] > self._peak(coded, places[best]) - self._plausible_within:
                 aim = places[best, IN_VIEW] * ANGLE_SCALE_RAD
@@ -86,7 +86,7 @@ class GazeLineBelief:
         coded = self._code(look)
         if coded is None:
             return None
-        density = self._mixed(coded, seen_places(look, candidates, ranges))[0]
+        density = self._density(coded, seen_places(look, candidates, ranges))
         shares = np.exp(density - density.max(initial=-np.inf))
         return np.asarray(shares / shares.sum())
 
@@ -170,6 +170,12 @@ class GazeLineBelief:
         parts += self._log_weights[:, None, None, None]
         return parts
 
+    def _density(self, coded: '_Coded', places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return log p (m,) of candidates, rows of places: once for proposal and gain."""
+        if coded.asked is None or not np.array_equal(coded.asked[0], places, equal_nan=True):
+            coded.asked = places, self._mixed(coded, places)[0]
+        return coded.asked[1]
+
     def _mixed(self, coded: '_Coded', places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return log p of rows (m, 8) of places, given a face: (1, m)."""
         parts, known = self._parts(coded.forms, places[:, IN_VIEW]), known_from_eyes(places)
@@ -227,11 +233,12 @@ class AnswersFromSnapshot:
         return self.snapshot().belief(look, rng, count)
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Coded:
     """One face, coded: its gazes, pan and tilt, and their forms.
 
-    `best_guess`: (2,) [rad] on the line of gaze of the surest member.
+    `best_guess`: (2,) [rad] on the line of gaze of the surest member. `asked`: the candidates that
+    were asked about last, and log p of each.
     """
 
     look: Look
@@ -239,3 +246,4 @@ class _Coded:
     forms: NDArray[np.float64]
     best_guess: NDArray[np.float64]
     log_density_there: float
+    asked: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
