@@ -11,60 +11,22 @@ Candidate sets of other caregivers, of people that the test must not have (docs/
 """
 
 import argparse
-from dataclasses import replace
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import torch
 
-from ja_experiments.datasets.watching import PICTURES_A_SECOND, watch
-from ja_learning.core.face_code import FaceCode, save_face_code
-from ja_learning.core.gaze_line_places import seen_places
-from ja_learning.core.mean_face import standardised
-from ja_learning.core.others_face_code import OtherCaregiver, others_face_code
+from ja_experiments.face_codes import (
+    OTHERS_SEEDS,
+    OTHERS_TRIALS,
+    code_of_others,
+    code_of_pictures,
+    code_of_watching,
+)
+from ja_learning.core.face_code import save_face_code
 from ja_learning.core.trial import checked_face
-from ja_learning.core.watched_face_code import watched_face_code
 from ja_sim.core.caregiver import identities
-from ja_sim.core.scene import Scene, load_scene
-
-
-def watched_pictures(scene: Scene, seed: int, seconds: float) -> np.ndarray:
-    """Return the pictures (n, 30, 25) of so many seconds in which she was seen."""
-    wanted = round(seconds * PICTURES_A_SECOND)
-    pictures: list[np.ndarray] = []
-    for each in watch(scene, seed):
-        pictures.extend(each.pictures)
-        if len(pictures) >= wanted:
-            break
-    return np.array(pictures[:wanted])
-
-
-def other_caregiver(
-    scene: Scene, person: str, seed: int, trials: int
-) -> tuple[OtherCaregiver, int]:
-    """Return what is seen of a person in so many trials, and in how many pictures."""
-    scene = replace(scene, caregiver=replace(scene.caregiver, identity=person))
-    looks = list(islice(watch(scene, seed), trials))
-    pictures = np.concatenate([each.pictures for each in looks])
-    places = np.array([seen_places(each.look, each.objects) for each in looks], np.float32)
-    faces = np.array([each.look.face for each in looks])
-    mean_face = standardised(pictures).mean(axis=0)
-    return OtherCaregiver(person, faces, mean_face, places), len(pictures)
-
-
-def code_of_others(
-    scene: Scene, people: list[str], seeds: list[int], trials: int, seed: int
-) -> FaceCode:
-    """Train on one caregiver for each of the seeds, the people in turn."""
-    caregivers, pictures = [], 0
-    for index, each in enumerate(seeds):
-        person = people[index % len(people)]
-        caregiver, seen = other_caregiver(scene, person, each, trials)
-        caregivers.append(caregiver)
-        pictures += seen
-        print(f'{person} (seed {each}): {trials} trials, {seen / PICTURES_A_SECOND:.0f} s')
-    return others_face_code(caregivers, pictures / PICTURES_A_SECOND, seed)
+from ja_sim.core.scene import load_scene
 
 
 def parsed() -> argparse.Namespace:
@@ -79,8 +41,8 @@ def parsed() -> argparse.Namespace:
     watched.add_argument('--pictures', type=Path, help='an array (.npy) in place of the world')
     others = ways.add_parser('others', help='from candidate sets of other caregivers')
     others.add_argument('--people', nargs='+', choices=identities(), required=True)
-    others.add_argument('--seeds', type=int, nargs='+', default=list(range(30, 42)))
-    others.add_argument('--trials', type=int, default=120, help='of each caregiver')
+    others.add_argument('--seeds', type=int, nargs='+', default=OTHERS_SEEDS)
+    others.add_argument('--trials', type=int, default=OTHERS_TRIALS, help='of each caregiver')
     for each in (watched, others):
         each.add_argument('file', type=Path, help='to write, .npz')
         each.add_argument('--scene', default='default')
@@ -93,15 +55,13 @@ def main() -> None:
     given = parsed()
     # Several threads only wait for each other: the network is small.
     torch.set_num_threads(1)
-    scene = load_scene(given.scene)
+    scene, seed = load_scene(given.scene), given.training_seed
     if given.way == 'others':
-        code = code_of_others(scene, given.people, given.seeds, given.trials, given.training_seed)
+        code = code_of_others(scene, given.people, seed, given.seeds, given.trials, print)
+    elif given.pictures is None:
+        code = code_of_watching(scene, given.seed, given.seconds, seed)
     else:
-        if given.pictures is None:
-            pictures = watched_pictures(scene, given.seed, given.seconds)
-        else:
-            pictures = np.array([*map(checked_face, np.load(given.pictures))])
-        code = watched_face_code(pictures, len(pictures) / PICTURES_A_SECOND, given.training_seed)
+        code = code_of_pictures(np.array([*map(checked_face, np.load(given.pictures))]), seed)
     save_face_code(given.file, code)
     origin = code.origin
     print(

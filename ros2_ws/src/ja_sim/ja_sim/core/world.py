@@ -120,7 +120,9 @@ class JointAttentionWorld:
         self.clamped = False
         self._head.reset()
         caregiver = self._caregiver
-        caregiver.apply_appearance(draw_appearance(self.scene.caregiver, looks))
+        appearance = draw_appearance(self.scene.caregiver, looks)
+        self.person = appearance.identity
+        caregiver.apply_appearance(appearance)
         self._lighting.randomise(self.scene.room.light_variation, looks)
         self._gaze = GazeShift(caregiver.eyes, caregiver.to_rest_frame(np.zeros(3)))
         face = caregiver.face_position(self._gaze.pose(0.0))
@@ -265,6 +267,8 @@ class JointAttentionWorld:
         share, noise = behaviour.response.head_share, np.array(behaviour.response.head_noise_rad)
         if self._attended == ROBOT:
             share, noise = 1.0, np.zeros(2)
+        if not self._caregiver.eyes_turn:
+            share = 1.0
         start_s = self._time_s + spec.reaction_s
         self._gaze.start(start_s, spec.turn_s, self._target_now(), share, noise)
         self._turned_s = start_s + spec.turn_s
