@@ -421,3 +421,49 @@ def test_a_face_or_a_speed_that_is_not_finite_is_neither_centred_nor_at_rest(bad
         posture = Posture(10**9, np.zeros(2), np.array(velocity))
         cycle.step(CycleInput(posture, face_delta=np.array(face_delta)))
         assert cycle.phase is Phase.LOOK
+
+
+def test_search_starts_where_the_head_stands_and_never_rests():
+    """At a rest an object could be fixated, as the end of a trial that was no trial."""
+    world = AngleWorld(face=None)
+    world.position = np.array([0.5, -0.2])
+    cycle = make_cycle(search_after_s=0.5, search_period_s=8.0)
+    rounds = run(cycle, world, 200)
+    searching = rounds[first(rounds, Phase.SEARCH) :]
+    targets = np.array([decision.target for _, decision in searching])
+    assert targets[0] == pytest.approx((0.5, -0.2))
+    steps = np.abs(np.diff(targets, axis=0)) / PERIOD_S
+    assert steps.max() < 1.0, 'calm: half the speed of a shift'
+    assert not any(percept.posture.is_still(0.05) for percept, _ in searching[3:])
+
+
+def test_an_interrupted_look_is_no_trial_and_the_head_stays_where_it_looked_from():
+    world = AngleWorld(objects=[(0.3, 0.0)], face=(0.0, 0.0))
+    cycle = make_cycle(dwell_s=1.0, search_after_s=1.0)
+    rounds = run(cycle, world, 4)
+    world.face = np.array([0.12, 0.0])  # she gets up, is seen for one more image, and is gone
+    rounds += run(cycle, world, 1)
+    world.face = None
+    rounds += run(cycle, world, 20)
+    assert Phase.SHIFT not in phases(rounds)
+    assert cycle.trials == 0
+    waited = rounds[7 : first(rounds, Phase.SEARCH)]
+    assert waited
+    assert all(percept.posture.position == pytest.approx((0, 0)) for percept, _ in waited)
+
+
+def test_time_without_a_person_counts_while_the_head_looks_or_searches():
+    world = AngleWorld(objects=[(0.25, 0.1)])
+    cycle = make_cycle()
+    assert all(decision.phase in (Phase.LOOK, Phase.SHIFT) for _, decision in run(cycle, world, 9))
+    assert cycle.unseen_s == 0.0
+    while cycle.phase is not Phase.LOOK:
+        run(cycle, world, 1)
+    world.face = None
+    run(cycle, world, 31)
+    assert cycle.unseen_s == pytest.approx(3.0)
+    assert cycle.phase is Phase.SEARCH
+    world.face = np.zeros(2)
+    while cycle.phase is Phase.SEARCH:
+        run(cycle, world, 1)
+    assert cycle.unseen_s == 0.0

@@ -667,6 +667,24 @@ def test_other_topics_and_other_heads_have_commanders_of_their_own(make_bench, r
     bench.wait_for_complaint('/left/wheel is published by /peer as well')
 
 
+def test_status_states_that_no_person_is_seen_and_for_how_long(make_graph):
+    graph = make_graph(search_after_s=0.5, search_tilt_rad=0.0)
+    graph.image()
+    assert graph.status()[1]['unseen_s'] == '0.0'
+    for _ in range(4):
+        graph.image({})
+    assert graph.status()[0].message == 'look', 'a moment is not worth a word'
+    for _ in range(18):
+        graph.image({})
+    status, values = graph.status()
+    assert status.message == 'search: I see no person to look at, for 2 s'
+    assert (status.level, values['unseen_s']) == (bytes([Level.OK]), '2.1')
+    health = graph.bench.node.health.report(time.monotonic())
+    assert health.values['person'] == 'I see no person to look at, for 2 s'
+    graph.image()
+    assert graph.status()[0].message == 'look'
+
+
 def test_two_gates_in_lockstep_both_answer_with_the_measured_posture(make_graph):
     """The sim waits for an answer, and two different ones would pull the head to and fro."""
     graph = make_graph()

@@ -426,3 +426,24 @@ def test_an_opencv_that_cannot_read_the_landmarks_is_named_and_detections_go_on(
         assert 'install OpenCV 4.6 or newer' in status.message
     finally:
         rig.close()
+
+
+def test_health_states_who_is_seen(rig):
+    def people():
+        return rig.detector.health.values['people']
+
+    rig.joints(PERIOD_NS)
+    rig.image(PERIOD_NS, room())
+    rig.answer()
+    assert people() == 'I see no person, for 0 s'
+    for count in range(2, 6):
+        rig.joints(count * PERIOD_NS)
+        rig.image(count * PERIOD_NS, caregiver_and_ball())
+        rig.answer(count)
+    assert people() == 'I see the caregiver'
+    later = 60 * PERIOD_NS
+    for count, stamp_ns in ((6, later), (7, later + 20 * PERIOD_NS)):
+        rig.joints(stamp_ns)
+        rig.image(stamp_ns, room())
+        rig.answer(count)
+    assert people().startswith('I see no person, for')

@@ -46,7 +46,7 @@ from ja_control.core.joint_limits import JointLimitsConfig
 from ja_control.core.trial_count import load_trials, save_trials
 from ja_control.core.urdf_joint import read_joint
 from ja_control.core.urdf_limits import narrow_limits
-from ja_control.gate_status import encode_gate_status
+from ja_control.gate_status import describe_unseen, encode_gate_status
 
 _PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, GLANCE_DELTA, FIXATION)
 _EVIDENCE_COLUMNS = ('log_evidence', 'expected_gain')
@@ -299,6 +299,7 @@ class GateNode(GraphNode):
         return changed
 
     def _publish_status(self, command: Command) -> None:
+        self.health.values['person'] = describe_unseen(self._cycle) or 'no person is missing'
         self._status.publish(
             encode_gate_status(
                 self.get_fully_qualified_name(),

@@ -45,6 +45,7 @@ from ja_common.topics import (
 from ja_common.weight_files_codec import encode_weight_files
 from ja_perception.core.detector import DetectorConfig, Percept, SalientFeatureDetector
 from ja_perception.core.face_finders import FACE_FINDERS
+from ja_perception.core.face_tracking import PeopleSeen
 from ja_perception.core.gaze_reader import GazeReader
 from ja_perception.range_input import RangeConfig, RangeInput
 
@@ -91,6 +92,7 @@ class SalientFeatureDetectorNode(GraphNode):
         )
         self._detector = self._make_detector()
         self._newest_percept: tuple[int, Percept] | None = None
+        self._caregivers = 0
         self._image_topic = IMAGE_COMPRESSED if self._input.compressed else IMAGE
         self._camera = CameraInput(
             self.configure(CameraInputConfig), self.resolve_topic_name(self._image_topic.name)
@@ -189,6 +191,7 @@ class SalientFeatureDetectorNode(GraphNode):
         percept = self._newest_percept[1]
         header = self._camera.upright_header(message.header)
         self._publish_percept(header, percept)
+        self._report_people(percept.people)
         seconds = time.perf_counter() - start
         self.health.values['time an image [ms]'] = f'{1000 * seconds:.2f}'
         if self._ranges.is_chosen:
@@ -197,6 +200,12 @@ class SalientFeatureDetectorNode(GraphNode):
             self._ranges.record_known(known, len(percept.detections))
         if self._annotated_publisher.get_subscription_count():
             self._publish_annotated(header, image, percept, camera, seconds)
+
+    def _report_people(self, people: PeopleSeen) -> None:
+        self.health.values['people'] = people.describe()
+        if people.caregivers > max(self._caregivers, 1):
+            self.get_logger().info('another person is the caregiver now: she was gone for long')
+        self._caregivers = people.caregivers
 
     def _publish_percept(self, header: Header, percept: Percept) -> None:
         # Face image and gaze go first: a node that reads `attended`, `gaze_read` can rely on them.
@@ -228,7 +237,12 @@ class SalientFeatureDetectorNode(GraphNode):
     ) -> None:
         d_th_rad = self._config.attention.d_th_rad
         drawn = annotate_image(
-            image, percept.detections, percept.face_image, camera, d_th_rad, seconds
+            image,
+            percept.other_faces + percept.detections,
+            percept.face_image,
+            camera,
+            d_th_rad,
+            seconds,
         )
         self._annotated_publisher.publish(encode_image(drawn, header.stamp, header.frame_id))
 

@@ -139,6 +139,9 @@ class AttentionCycle:
         self._rng = rng
         self._reachable = reachable
         self.trials = 0
+        self.unseen_s = 0.0
+        """Time for which no face was there to look at, 0 while the head looks elsewhere."""
+        self._unseen_since_ns: int | None = None
         self._caregiver: NDArray[np.float64] | None = None
         self._target: NDArray[np.float64] | None = None
         self._learner_drawn = False
@@ -169,6 +172,7 @@ class AttentionCycle:
         }[self.phase]
         self._p_lm = self.gating.p_lm(self.trials, percept.log_evidence, percept.expected_gain)
         step(percept)
+        self._record_unseen(percept)
         target = percept.posture.position if self._target is None else self._target
         return Decision(target, self.phase, self._source, self._p_lm, self.trials, self._shifts)
 
@@ -179,6 +183,18 @@ class AttentionCycle:
         self._since_ns: int | None = None
         self._rests_since_ns: int | None = None
         self._face_in_view = True
+        # Where the head stood with the face in the centre, and where it began to search.
+        self._looked_from: NDArray[np.float64] | None = None
+        self._search_from: NDArray[np.float64] | None = None
+
+    def _record_unseen(self, percept: CycleInput) -> None:
+        now_ns = percept.posture.stamp_ns
+        if percept.face_delta is not None or self.phase not in (Phase.LOOK, Phase.SEARCH):
+            self._unseen_since_ns = None
+        elif self._unseen_since_ns is None or now_ns < self._unseen_since_ns:
+            self._unseen_since_ns = now_ns
+        since_ns = now_ns if self._unseen_since_ns is None else self._unseen_since_ns
+        self.unseen_s = (now_ns - since_ns) / NS_PER_S
 
     def _elapsed_s(self, percept: CycleInput) -> float:
         if self._since_ns is None:
@@ -202,6 +218,7 @@ class AttentionCycle:
             self._since_ns = None
             return
         # Centred: hold still, so that only the caregiver moves in the image of the face.
+        self._looked_from = percept.posture.position
         if self._elapsed_s(percept) >= self.config.dwell_s:
             self._enter_phase(Phase.GLANCE)
             self._glance_or_shift(percept)
@@ -222,7 +239,10 @@ class AttentionCycle:
 
     def _look_at_last_face(self, percept: CycleInput) -> None:
         self._source = Source.NONE
-        if self._caregiver is not None:
+        if self._looked_from is not None:
+            # An interrupted look is no trial: a rest elsewhere would look like its shift.
+            self._target = self._looked_from
+        elif self._caregiver is not None:
             self._target = self._caregiver
         if self._elapsed_s(percept) >= self.config.search_after_s and self._is_still(percept):
             self._caregiver = None
@@ -269,10 +289,21 @@ class AttentionCycle:
             self._enter_phase(Phase.LOOK)
             self._step_look(percept)
             return
-        c = self.config
-        angle = 2 * math.pi * self._elapsed_s(percept) / c.search_period_s
-        sweep = [c.search_pan_rad * math.sin(angle), c.search_tilt_rad * math.sin(3 * angle)]
-        self._target = self._home_posture() + sweep
+        c, home = self.config, self._home_posture()
+        if self._search_from is None:
+            self._search_from = percept.posture.position
+        # To the home posture at the speed of the sweep, and on in the same direction. One of the
+        # joints always turns: a rest would look like the shift of an interrupted look.
+        rate = 2 * math.pi / c.search_period_s
+        way = home - self._search_from
+        joining_s = math.hypot(*way) / max(rate * c.search_pan_rad, 1e-3)
+        elapsed_s = self._elapsed_s(percept)
+        if elapsed_s < joining_s:
+            self._target = self._search_from + elapsed_s / joining_s * way
+            return
+        angle = math.copysign(rate, way[0]) * (elapsed_s - joining_s)
+        sweep = [c.search_pan_rad * math.sin(angle), c.search_tilt_rad * math.sin(2 * angle)]
+        self._target = home + sweep
 
     def _step_home(self, percept: CycleInput) -> None:
         self._target = self._home_posture()

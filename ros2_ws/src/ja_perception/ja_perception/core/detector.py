@@ -14,7 +14,7 @@ from ja_common.core.fixation import WIDTH_SIXTH, stands_in_centre
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
 from ja_perception.core.box import Box
 from ja_perception.core.face_crop import FACE_COLUMNS, FACE_ROWS, crop_face
-from ja_perception.core.face_tracking import FaceConfig, FaceTracker
+from ja_perception.core.face_tracking import FaceConfig, FaceTrack, FaceTracker, PeopleSeen
 from ja_perception.core.faces import FaceFinder
 from ja_perception.core.features import FeatureConfig
 from ja_perception.core.gaze_reader import GazeReader, GazeReading, StoredGaze
@@ -36,6 +36,10 @@ class AttentionConfig(Configuration):
     still_below_rad_s: float = parameter(
         STILL_BELOW_RAD_S, 'the head is still when both joints are slower', low=0.0, high=10.0
     )
+    attended_within_s: float = parameter(
+        0.2, 'a face that was not found for longer is held, but not attended to',
+        low=0.0, high=10.0,
+    )  # fmt: skip
     crop_widths: float = parameter(
         1.5, 'width of the face image (in widths of the face)', low=0.5, high=5.0
     )
@@ -59,6 +63,8 @@ class Percept:
     """The faces and objects of one image.
 
     ``detections``: the caregiver's face first, other faces, then objects, most salient first.
+    While hers is not in view there are no faces among them, so that no other is taken for hers;
+    they are in ``other_faces``. ``people``: who is there.
     ``face_image``: (30, 25) uint8 while the head attends to the caregiver, cut from
     ``face_image_box`` [px]; else both are None. ``gaze_reading``: of the same face, where its gaze
     is read. ``motion_judged``: False where motion could not be measured (alpha_mot = 0, the first
@@ -71,6 +77,8 @@ class Percept:
     motion_judged: bool
     moving_share: float
     gaze_reading: GazeReading | None = None
+    people: PeopleSeen = field(default_factory=PeopleSeen)
+    other_faces: list[Detection] = field(default_factory=list)
 
     @property
     def target(self) -> Detection | None:
@@ -133,7 +141,8 @@ class SalientFeatureDetector:
         objects = self._objects.find_objects(
             image, stamp_ns, camera, posture, [_whole_head(box) for box in boxes]
         )
-        attended = bool(faces) and self._attends(rays[0], posture)
+        people = self._faces.people
+        attended = people.caregiver_in_view and self._attends(faces[0], rays[0], posture)
         crop_box = self._crop_box(boxes[0]) if attended else None
         face_image = None if crop_box is None else crop_face(grey, crop_box)
         reading = None
@@ -148,6 +157,10 @@ class SalientFeatureDetector:
                 gaze_read=picture_follows and reading is not None,
             )  # fmt: skip
             face_rows.append(row)
+        other_faces = [] if people.caregiver_in_view else face_rows
+        if other_faces:
+            # The first face of a message is the caregiver's, for all that follow her.
+            face_rows, boxes = [], []
         detections = face_rows + objects
         if depth is not None:
             own = zip(objects, self._objects.masks(), strict=True)
@@ -163,11 +176,18 @@ class SalientFeatureDetector:
             self._objects.motion_judged,
             self._objects.moving_share,
             reading,
+            people,
+            other_faces,
         )
 
-    def _attends(self, ray: NDArray[np.float64], posture: Posture | None) -> bool:
-        """Return whether the head rests with the ray (x, y) in the centre (Eq. 3)."""
+    def _attends(self, face: FaceTrack, ray: NDArray[np.float64], posture: Posture | None) -> bool:
+        """Return whether the head rests with a face, at the ray (x, y), in the centre (Eq. 3).
+
+        Where a face was but is no longer found, there is none to attend to.
+        """
         if posture is None or not posture.is_still(self._config.attention.still_below_rad_s):
+            return False
+        if face.missed_s > self._config.attention.attended_within_s:
             return False
         return stands_in_centre(ray, self._config.attention.d_th_rad)
 
