@@ -5,8 +5,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from rclpy.context import Context
 
-from ja_runner.graph import rig_graph, sim_graph
+from ja_common.topics import CAREGIVER_REQUEST
+from ja_runner.graph import meet_graph, rig_graph, sim_graph
+from ja_runner.node_spec import NodeSpec
 
 SOURCES = Path(__file__).parents[2] / 'ros2_ws' / 'src'
 MIDDLE = {'ja_perception', 'ja_control', 'ja_learning', 'ja_sim'}
@@ -82,7 +85,19 @@ def test_no_package_imports_a_node(package):
     assert not wrong
 
 
-@pytest.mark.parametrize('package', ['ja_perception', 'ja_control', 'ja_learning'])
+ROBOT = ['ja_perception', 'ja_control', 'ja_learning']
+
+
+@pytest.mark.parametrize('package', ROBOT)
+def test_the_robot_never_knows_what_a_person_is_asked(package):
+    for path in sorted((SOURCES / package / package).rglob('*.py')):
+        text = path.read_text()
+        assert CAREGIVER_REQUEST.name not in text, path
+        assert 'CAREGIVER_REQUEST' not in text, path
+        assert 'ja_caregiver' not in text, path
+
+
+@pytest.mark.parametrize('package', ROBOT)
 def test_the_robot_never_knows_the_truth(package):
     forbidden = ('truth', 'score')
     wrong = [
@@ -111,3 +126,30 @@ def test_only_the_scorer_subscribes_to_the_truth(ros_context):
     for node in nodes:
         node.destroy_node()
     assert subscribers == {'scorer'}
+
+
+def test_only_the_page_subscribes_to_what_a_person_is_asked(ros_context: Context) -> None:
+    """The running graph of `./ja meet` is walked, with and without a digital head."""
+    page = NodeSpec('ja_dashboard', 'view')
+    graph = {spec.executable: spec for spec in (*meet_graph(str(Path(__file__).parent)), page)}
+    assert graph.keys() >= {spec.executable for spec in meet_graph()}
+    del graph['camera']
+    nodes = [
+        spec.load()(context=ros_context, cli_args=spec.ros_arguments()) for spec in graph.values()
+    ]
+    topic = f'/{CAREGIVER_REQUEST.name}'
+    publishers, subscribers = set(), set()
+    for node in nodes:
+        name = node.get_name(), node.get_namespace()
+        if topic in dict(node.get_publisher_names_and_types_by_node(*name)):
+            publishers.add(node.get_name())
+        if topic in dict(node.get_subscriber_names_and_types_by_node(*name)):
+            subscribers.add(node.get_name())
+        # The scorer publishes nothing else that the robot could read.
+        if node.get_name() == 'request_scorer':
+            published = set(node.published_topics.values())
+    for node in nodes:
+        node.destroy_node()
+    assert publishers == {'request_scorer'}
+    assert subscribers <= {'view'}
+    assert {each.name for each in published} == {CAREGIVER_REQUEST.name, '/diagnostics'}

@@ -5,12 +5,10 @@ JA_SCREENSHOTS=FOLDER keeps screenshots.
 
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -21,14 +19,10 @@ import numpy as np
 import pytest
 from nicegui import __version__
 
+from chromium import browsers, console_errors, needs_chromium, wait
 from ros_testing import PATIENCE_S
 
-CHROMIUM, DRIVER = shutil.which('chromium'), shutil.which('chromedriver')
-
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason='needs chromium and chromium-driver'),
-]
+pytestmark = [pytest.mark.slow, needs_chromium]
 
 # Name, width and height [px], and whether it is a phone.
 SCREENS = [('laptop', 1366, 1000, False), ('phone', 390, 844, True)]
@@ -125,37 +119,8 @@ def foreign_page() -> Iterator[Callable[[str], str]]:
 
 @pytest.fixture
 def browse() -> Iterator[Callable]:
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-
-    browsers = []
-
-    def start(width: int, height: int, phone: bool) -> webdriver.Chrome:
-        options = webdriver.ChromeOptions()
-        options.binary_location = CHROMIUM
-        for flag in (
-            'headless=new', 'no-sandbox', 'disable-gpu', 'disable-quic', 'no-first-run',
-            'disable-background-networking', 'disable-component-update', 'disable-sync',
-            'hide-scrollbars', 'host-resolver-rules=MAP evil.example 127.0.0.1',
-        ):  # fmt: skip
-            options.add_argument(f'--{flag}')
-        options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
-        browser = webdriver.Chrome(options=options, service=Service(DRIVER))
-        browsers.append(browser)
-        screen = {'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': phone}
-        browser.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', screen)
-        return browser
-
-    yield start
-    for browser in browsers:
-        browser.quit()
-
-
-def wait(condition: Callable[[], object], timeout_s: float = PATIENCE_S) -> None:
-    end = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < end, f'not within {timeout_s:g} s'
-        time.sleep(0.1)
+    with browsers() as start:
+        yield start
 
 
 def keep(browser, name: str) -> None:
@@ -176,10 +141,6 @@ def picture(browser) -> np.ndarray:
 
 def source(browser) -> str:
     return browser.execute_script("return document.images[0]?.src ?? ''")
-
-
-def console_errors(browser) -> list[str]:
-    return [entry['message'] for entry in browser.get_log('browser') if entry['level'] == 'SEVERE']
 
 
 def wait_for_picture(browser) -> None:

@@ -36,6 +36,7 @@ from ja_common.point_cloud_codec import encode_columns
 from ja_common.topics import (
     BELIEF,
     CAMERA_INFO,
+    CAREGIVER_REQUEST,
     DETECTIONS,
     DIAGNOSTICS,
     FACE_GAZE,
@@ -52,6 +53,7 @@ from ja_common.topics import (
     WEIGHT_FILES,
 )
 from ja_common.weight_files_codec import encode_weight_files
+from ja_dashboard.core.meeting_view import MeetingPhase, NumberedThing
 from ja_dashboard.core.view_model import RunState
 from ja_dashboard.view_node import ViewNode
 from node_bench import header, joint_state
@@ -457,6 +459,64 @@ def test_buttons_call_services_and_log_the_answer(bench):
     assert asked == [False, None]
     bench.node.call_trigger('sim/step')
     wait_for_log(bench, 'sim/step: no node offers this service')
+
+
+def test_a_meeting_is_shown_without_a_viewer_and_grows_silent(make_bench):
+    bench = make_bench(ViewNode, publishes=[CAREGIVER_REQUEST])
+    assert bench.node.frame.meeting is None
+    asked = status(text='Look at thing 3.', phase='thing', number='3', things='3 0.2 -0.1')
+    bench.publish(CAREGIVER_REQUEST, asked)
+    bench.wait(lambda: bench.node.frame.meeting)
+    meeting = bench.node.frame.meeting
+    assert (meeting.phase, meeting.number) == (MeetingPhase.THING, 3)
+    assert meeting.message == 'Look at thing 3.'
+    assert meeting.things == (NumberedThing(3, (0.2, -0.1)),)
+    bench.node._request_s -= 10.0
+    bench.wait(lambda: bench.node.frame.meeting.is_silent)
+    bench.publish(CAREGIVER_REQUEST, status(text='<b>', phase='a foreign one', number='many'))
+    bench.wait(lambda: bench.node.frame.meeting.message == '<b>')
+    assert not bench.node.frame.meeting.is_silent
+    assert bench.complaint() == 'OK', 'what is odd in it is left out'
+
+
+def test_a_meeting_is_paused_ended_and_its_things_are_moved_by_services(bench):
+    asked = []
+
+    def answer(name, request, response):
+        asked.append((name, getattr(request, 'data', None)))
+        response.success, response.message = True, 'done'
+        return response
+
+    services = {
+        'caregiver/pause': SetBool,
+        'caregiver/end': Trigger,
+        'caregiver/rearranged': Trigger,
+    }
+    assert not services.keys() & bench.node.frame.services
+    for name, service in services.items():
+        bench.peer.create_service(service, name, partial(answer, name))
+    bench.wait(lambda: services.keys() <= bench.node.frame.services)
+    bench.node.call_switch('caregiver/pause', True)
+    wait_for_log(bench, 'caregiver/pause: done')
+    bench.node.call_trigger('caregiver/rearranged')
+    wait_for_log(bench, 'caregiver/rearranged: done')
+    bench.node.call_trigger('caregiver/end')
+    wait_for_log(bench, 'caregiver/end: done')
+    assert asked == [
+        ('caregiver/pause', True),
+        ('caregiver/rearranged', None),
+        ('caregiver/end', None),
+    ]
+
+
+def test_the_last_pictures_are_kept_for_the_browser(bench):
+    watch(bench)
+    stamps = show_images(bench, lambda _: len(bench.node.frame.recent) == 4)
+    frame = bench.node.frame
+    assert frame.recent[-1] is frame.picture
+    assert {each.stamp_ns for each in frame.recent} <= set(stamps)
+    bench.node._viewer_s = -math.inf
+    bench.wait(lambda: bench.node.frame.recent == ())
 
 
 @dataclass(frozen=True)

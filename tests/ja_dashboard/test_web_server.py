@@ -13,6 +13,7 @@ import pytest
 from nicegui import __version__
 
 import fake_page
+from ja_dashboard.meeting_page import MEETING_URL, PLAIN_PICTURE_URL, REPORT_URL
 from ja_dashboard.page import PICTURE_URL
 from ros_testing import PATIENCE_S
 
@@ -20,7 +21,7 @@ SOCKET_URL = '/_nicegui_ws/socket.io/?EIO=4&transport=websocket'
 POLLING_URL = '/_nicegui_ws/socket.io/?EIO=4&transport=polling'
 SCRIPT_URL = f'/_nicegui/{__version__}/static/nicegui.js'
 ROUTES = ['/', '/any/page', PICTURE_URL, SCRIPT_URL, POLLING_URL, '/favicon.ico', '/docs',
-          '/openapi.json']  # fmt: skip
+          '/openapi.json', MEETING_URL, PLAIN_PICTURE_URL, REPORT_URL]  # fmt: skip
 UPGRADE = (
     'Connection: Upgrade', 'Upgrade: websocket', 'Sec-WebSocket-Version: 13',
     f'Sec-WebSocket-Key: {base64.b64encode(bytes(16)).decode()}',
@@ -94,6 +95,9 @@ def test_the_page_its_picture_and_its_socket_are_served(local):
     assert status(page) == 200
     assert 'Joint attention' in page
     assert 'image/jpeg' in get(local, PICTURE_URL)
+    assert status(get(local, MEETING_URL)) == 200
+    assert 'image/jpeg' in get(local, PLAIN_PICTURE_URL)
+    assert status(get(local, REPORT_URL)) == 404, 'no meeting has ended'
     assert status(connect(local, origin_of(local))) == 101
 
 

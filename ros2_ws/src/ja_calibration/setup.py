@@ -7,7 +7,10 @@ from setuptools import find_packages, setup
 
 MANIFEST = ElementTree.parse(Path(__file__).with_name('package.xml')).getroot()
 PACKAGE = MANIFEST.findtext('name')
-DATA = ('yaml', 'xml', 'obj', 'png', 'jpg', 'npz', 'onnx', 'caffemodel', 'prototxt', 'txt', 'md')
+DATA = (
+    'yaml', 'xml', 'obj', 'png', 'jpg', 'npz', 'onnx', 'caffemodel', 'prototxt', 'txt', 'md',
+    'js', 'css', 'urdf',
+)  # fmt: skip
 
 setup(
     name=PACKAGE,

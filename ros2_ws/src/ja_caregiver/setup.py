@@ -7,7 +7,10 @@ from setuptools import find_packages, setup
 
 MANIFEST = ElementTree.parse(Path(__file__).with_name('package.xml')).getroot()
 PACKAGE = MANIFEST.findtext('name')
-DATA = ('yaml', 'xml', 'obj', 'png', 'jpg', 'npz', 'onnx', 'caffemodel', 'prototxt', 'txt', 'md')
+DATA = (
+    'yaml', 'xml', 'obj', 'png', 'jpg', 'npz', 'onnx', 'caffemodel', 'prototxt', 'txt', 'md',
+    'js', 'css', 'urdf',
+)  # fmt: skip
 
 setup(
     name=PACKAGE,
@@ -26,4 +29,10 @@ setup(
     zip_safe=False,
     # From this `colcon test` knows that it has to start pytest; see setup.cfg.
     extras_require={'test': ['pytest']},
+    entry_points={
+        'console_scripts': [
+            'film_session = ja_caregiver.film_session_node:main',
+            'request_scorer = ja_caregiver.request_scorer_node:main',
+        ],
+    },
 )

@@ -7,7 +7,10 @@ from setuptools import find_packages, setup
 
 MANIFEST = ElementTree.parse(Path(__file__).with_name('package.xml')).getroot()
 PACKAGE = MANIFEST.findtext('name')
-DATA = ('yaml', 'xml', 'obj', 'png', 'jpg', 'npz', 'onnx', 'caffemodel', 'prototxt', 'txt', 'md')
+DATA = (
+    'yaml', 'xml', 'obj', 'png', 'jpg', 'npz', 'onnx', 'caffemodel', 'prototxt', 'txt', 'md',
+    'js', 'css', 'urdf',
+)  # fmt: skip
 
 setup(
     name=PACKAGE,
@@ -29,6 +32,7 @@ setup(
     entry_points={
         'console_scripts': [
             'gate = ja_control.gate_node:main',
+            'head_frames = ja_control.head_frames_node:main',
             'visual_feedback_controller = ja_control.visual_feedback_controller_node:main',
         ],
     },

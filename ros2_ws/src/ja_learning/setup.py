@@ -9,7 +9,7 @@ MANIFEST = ElementTree.parse(Path(__file__).with_name('package.xml')).getroot()
 PACKAGE = MANIFEST.findtext('name')
 DATA = (
     'yaml', 'xml', 'obj', 'png', 'jpg', 'npz', 'onnx', 'caffemodel', 'prototxt', 'txt', 'md',
-    'js', 'css',
+    'js', 'css', 'urdf',
 )  # fmt: skip
 
 setup(

@@ -7,7 +7,10 @@ from setuptools import find_packages, setup
 
 MANIFEST = ElementTree.parse(Path(__file__).with_name('package.xml')).getroot()
 PACKAGE = MANIFEST.findtext('name')
-DATA = ('yaml', 'xml', 'obj', 'png', 'jpg', 'npz', 'onnx', 'caffemodel', 'prototxt', 'txt', 'md')
+DATA = (
+    'yaml', 'xml', 'obj', 'png', 'jpg', 'npz', 'onnx', 'caffemodel', 'prototxt', 'txt', 'md',
+    'js', 'css', 'urdf',
+)  # fmt: skip
 
 setup(
     name=PACKAGE,
@@ -31,6 +34,7 @@ setup(
             'camera = ja_perception.camera_node:main',
             'echo_detections = ja_perception.echo_detections_node:main',
             'salient_feature_detector = ja_perception.salient_feature_detector_node:main',
+            'standard_outputs = ja_perception.standard_outputs_node:main',
         ],
     },
 )

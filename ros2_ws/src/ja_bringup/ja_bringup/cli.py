@@ -11,6 +11,7 @@ from ja_bringup.commands import (
     development,
     diagnostics,
     experiments,
+    meet,
     recording,
     rig,
     rig_tools,
@@ -37,7 +38,7 @@ _FITTING_VERSIONS = 'those of requirements/*.lock, or of requirements/ubuntu-24.
 
 # In the order of the help page.
 _GROUPS = (
-    demo, rig, development, experiments, recording, diagnostics, rig_tools, calibration
+    demo, rig, meet, development, experiments, recording, diagnostics, rig_tools, calibration
 )  # fmt: skip
 for _group in _GROUPS:
     _group.register(app)

@@ -1,14 +1,22 @@
 """The demo: a simulated head learns joint attention while you watch."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ja_bringup.course import Course, Stage
 from ja_common.core.run_folder import new_run_folder
+from ja_runner.graph import with_arguments
 from ja_runner.node_spec import NodeSpec
 from ja_runner.progress import WINDOW_TRIALS, ProgressNode
 from ja_runner.run import check_memory, run_graph
 from ja_runner.supervisor import Supervision
+
+if TYPE_CHECKING:
+    from ja_sim.core.photo_head_file import PhotoHead
+
+PHOTO_FILE = 'caregiver.npz'
 
 
 def run_demo(
@@ -20,19 +28,31 @@ def run_demo(
     view: bool = False,
     resume: Path | None = None,
     markers: bool = False,
+    caregiver: 'PhotoHead | None' = None,
+    elsewhere: Sequence[NodeSpec] = (),
+    frames: bool = False,
+    standard_outputs: bool = False,
 ) -> int:
     """Lead the graph through the stages of a course and print a summary; return the exit code.
 
     The code is 0 if a trial was finished, also where a signal has ended the run, and all is saved.
-    `resume`: the folder of a run whose learner and gate continue from where they ended. Raises
-    ConfigError when that folder holds no checkpoint.
+    `resume`: the folder of a run whose learner and gate continue from where they ended.
+    `caregiver`: the head of a photograph that plays her; it is saved beside the run's results.
+    `elsewhere`: the nodes that run on another machine. The machine with the sim leads the course
+    and prints the summary; any other runs its nodes until a signal ends it. Raises ConfigError
+    when the folder to resume from holds no checkpoint.
     """
+    leads = any(spec.executable == 'sim' for spec in graph)
     if resume is not None:
         check_memory(resume)
     folder = new_run_folder('demo')
+    if caregiver is not None:
+        graph = with_photo(graph, caregiver, folder)
     course: list[Course] = []
 
     def over(node: ProgressNode) -> bool:
+        if not leads:
+            return False
         if not course:
             course.append(Course(node, stages))
         return course[0].tick()
@@ -45,10 +65,15 @@ def run_demo(
         one_process=one_process,
         view=view,
         markers=markers,
+        frames=frames,
+        standard_outputs=standard_outputs,
         supervision=supervision,
         arguments=arguments,
         memory=resume,
+        elsewhere=with_arguments(elsewhere, arguments),
     )
+    if not leads:
+        return code
     lines = summary(progress, stages)
     if progress.curve.records:
         # First: printing may fail as well.
@@ -60,6 +85,19 @@ def run_demo(
     for line in lines:
         print(line)
     return code
+
+
+def with_photo(graph: Sequence[NodeSpec], head: 'PhotoHead', folder: Path) -> list[NodeSpec]:
+    """Save the head of a photograph into a run's folder; return the graph whose sim shows it."""
+    from ja_sim.core.photo_head_file import write_photo_head
+
+    photo = write_photo_head(folder.absolute() / PHOTO_FILE, head)
+    return [
+        replace(spec, parameters={**spec.parameters, 'photo': str(photo)})
+        if spec.executable == 'sim'
+        else spec
+        for spec in graph
+    ]
 
 
 def save_curve(progress: ProgressNode, folder: Path) -> tuple[bool, list[str]]:

@@ -39,6 +39,7 @@ NODES = (
     NodeSpec('ja_sim', 'sim'),
     NodeSpec('ja_sim', 'scorer'),
     NodeSpec('ja_sim', 'digital_head'),
+    NodeSpec('ja_caregiver', 'request_scorer'),
 )
 COMPANIONS = (
     NodeSpec('ja_dashboard', 'view'),

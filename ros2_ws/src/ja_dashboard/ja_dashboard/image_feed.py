@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -61,6 +62,9 @@ _STEPS = (DETECTIONS, VF_DELTA, LM_DELTA, FIXATION, JOINT_COMMANDS)
 _ASSUMED_VIEW_RAD = math.radians(36)
 _JPEG_QUALITY = 80
 _MOST_PX = 8192
+_PLAIN_WIDTH = 1280
+_RECENT = 4
+"""Pictures that a browser may still ask for by their stamps."""
 LIMITS = ('pan_min_rad', 'tilt_min_rad', 'pan_max_rad', 'tilt_max_rad')
 """The gate's parameters, in the order of (low, high)."""
 
@@ -84,8 +88,16 @@ class Picture:
         )
         scale = drawn.shape[1] / self.image.shape[1]
         draw_gaze(drawn, self.gaze, self.detections, scale)
-        quality = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
-        return cv2.imencode('.jpg', cv2.cvtColor(drawn, cv2.COLOR_RGB2BGR), quality)[1].tobytes()
+        return _jpeg(drawn)
+
+    def plain_jpeg(self) -> bytes:
+        """Return the image as JPEG with nothing drawn into it, at most 1280 pixels wide."""
+        height, width = self.image.shape[:2]
+        shown = self.image
+        if width > _PLAIN_WIDTH:
+            size = (_PLAIN_WIDTH, max(1, round(height * _PLAIN_WIDTH / width)))
+            shown = cv2.resize(shown, size, interpolation=cv2.INTER_AREA)
+        return _jpeg(shown)
 
 
 class ImageFeed:
@@ -113,9 +125,14 @@ class ImageFeed:
         self._truth: TruthView | None = None
         self._looked_for_senses_s = -math.inf
         self.limits = np.radians([[-60.0, -35.0], [60.0, 35.0]])
-        self.picture: Picture | None = None
+        self.recent: deque[Picture] = deque(maxlen=_RECENT)
         self.scene: SceneView | None = None
         self.latencies_ms: dict[str, float] = {}
+
+    @property
+    def picture(self) -> Picture | None:
+        """Return the newest picture."""
+        return self.recent[-1] if self.recent else None
 
     def close(self) -> None:
         """Stop listening."""
@@ -260,7 +277,7 @@ class ImageFeed:
             gaze=gaze.direction,
         )  # fmt: skip
         grey = None if face_image is None else face_image[..., 0]
-        self.picture = Picture(stamp_ns, image, detections, grey, camera, latency_s, gaze)
+        self.recent.append(Picture(stamp_ns, image, detections, grey, camera, latency_s, gaze))
 
     def _decoded(self, topic: Topic, decode: Callable[[Any], Any], message: Any) -> Any:
         """Return what `decode` makes of a message; None and a problem where it raises."""
@@ -276,6 +293,11 @@ class ImageFeed:
         height, width = image.shape[:2]
         camera = self._decoded(CAMERA_INFO, self._camera.camera, image)
         return camera or CameraModel.from_field_of_view(width, height, _ASSUMED_VIEW_RAD)
+
+
+def _jpeg(image: NDArray[np.uint8]) -> bytes:
+    quality = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
+    return cv2.imencode('.jpg', cv2.cvtColor(image, cv2.COLOR_RGB2BGR), quality)[1].tobytes()
 
 
 def _shown_image(message: Image) -> NDArray[np.uint8]:

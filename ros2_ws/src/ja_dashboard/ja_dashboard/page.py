@@ -4,11 +4,14 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any, Protocol
 
+from fastapi import Response
+from fastapi.responses import RedirectResponse
 from nicegui import ui
 
 from ja_common.core.health import Level
 from ja_dashboard.core import drawings
 from ja_dashboard.core.view_model import CurvePoints, NodeHealth, RunState
+from ja_dashboard.meeting_page import MEETING_URL, MeetingModel, MeetingPage
 
 PICTURE_URL = '/picture.jpg'
 _PICTURE_EVERY_S = 0.1
@@ -44,17 +47,11 @@ body { background: #0f172a }
 """
 
 
-class PageModel(Protocol):
+class PageModel(MeetingModel, Protocol):
     """What the page needs of a `ViewNode`: frames to show, and requests to pass on."""
 
-    @property
-    def frame(self) -> Any: ...
-    def note_viewer(self) -> None: ...
     def show_truth(self, shown: bool) -> None: ...
-    def call_switch(self, service: str, on: bool) -> None: ...
-    def call_trigger(self, service: str) -> None: ...
     def set_remote_parameter(self, name: str, value: Any) -> None: ...
-    def report_failure(self, where: str, error: Exception) -> None: ...
 
 
 class Page:
@@ -63,16 +60,26 @@ class Page:
     def __init__(self, model: PageModel) -> None:
         self._model = model
 
-    def build(self) -> None:
-        """Build the page for one browser."""
-        _OpenPage(self._model)
+    def build(self) -> Response | None:
+        """Build the page that a browser asks for; while a meeting runs, the first is its own."""
+        request = ui.context.client.request
+        path = request.url.path if request is not None else '/'
+        meeting = self._model.frame.meeting
+        if path == MEETING_URL:
+            MeetingPage(self._model)
+        elif path == '/' and meeting is not None and not meeting.is_silent:
+            return RedirectResponse(MEETING_URL, 307)
+        else:
+            _OpenPage(self._model, leads_to_meeting=path == '/')
+        return None
 
 
 class _OpenPage:
     """One open page."""
 
-    def __init__(self, model: PageModel) -> None:
+    def __init__(self, model: PageModel, leads_to_meeting: bool) -> None:
         self._model = model
+        self._leads_to_meeting = leads_to_meeting
         self._shown_log = 0
         self._shown_stamp = 0
         self._curve: CurvePoints | None = None
@@ -84,6 +91,7 @@ class _OpenPage:
             ui.label('Joint attention').classes('text-lg font-medium')
             self._badge = ui.badge('').mark('state').classes('text-sm px-2 py-1')
             self._why = ui.label().mark('why').classes('ja-quiet text-sm')
+            self._meeting = ui.link('the meeting', MEETING_URL).classes('text-sm ml-auto')
         self._add_controls()
         with ui.element('div').classes('ja-page'):
             with self._card('What it sees'):
@@ -188,6 +196,7 @@ class _OpenPage:
         """Show the frame; a part that fails is reported, and the others are shown."""
         frame = self._model.frame
         for show in (
+            self._show_meeting,
             self._show_state,
             self._show_scene,
             self._show_nodes,
@@ -199,6 +208,12 @@ class _OpenPage:
                 show(frame)
             except Exception as error:
                 self._model.report_failure(f'page, {show.__name__}', error)
+
+    def _show_meeting(self, frame: Any) -> None:
+        self._meeting.set_visibility(frame.meeting is not None)
+        if self._leads_to_meeting and frame.meeting is not None and not frame.meeting.is_silent:
+            self._leads_to_meeting = False
+            ui.navigate.to(MEETING_URL)
 
     def _show_state(self, frame: Any) -> None:
         self._badge.set_text(frame.state.run.value)

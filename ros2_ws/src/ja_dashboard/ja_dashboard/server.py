@@ -6,18 +6,24 @@ import logging
 import secrets
 import socket
 import threading
+from collections.abc import Callable
 
 import uvicorn
-from fastapi import FastAPI, Response
+from fastapi import FastAPI, Request, Response
+from fastapi.responses import FileResponse
 from nicegui import core, ui
 
 from ja_common.core.config import ConfigError
 from ja_dashboard.access_guard import TOKEN, AccessGuard, allow_inline_scripts_of_page
 from ja_dashboard.core.access import AccessRules, listed_hosts, own_hosts
+from ja_dashboard.core.meeting_view import report_file
+from ja_dashboard.image_feed import Picture
+from ja_dashboard.meeting_page import PLAIN_PICTURE_URL, REPORT_URL
 from ja_dashboard.page import PICTURE_URL, Page, PageModel
 
 _GRACE_S = 1
 _PORTS = 50
+_NOT_KEPT = {'Cache-Control': 'no-store'}
 
 
 class Server(threading.Thread):
@@ -79,24 +85,41 @@ def web_app(model: PageModel) -> FastAPI:
 
 
 def picture_app(model: PageModel) -> FastAPI:
-    """Return an app that serves the newest picture as JPEG, drawn on request.
+    """Return an app that serves pictures as JPEG, drawn on request, and the report of a meeting.
 
-    Each request also notes a viewer.
+    Each request of a picture also notes a viewer.
     """
     app = FastAPI(openapi_url=None)
 
-    @app.get(PICTURE_URL)
-    def picture() -> Response:
+    def jpeg(shown: Picture | None, encode: Callable[[Picture], bytes]) -> Response:
         model.note_viewer()
-        shown = model.frame.picture
         if shown is None:
             return Response(status_code=404)
         try:
-            jpeg = shown.jpeg()
+            content = encode(shown)
         except Exception as error:
             model.report_failure('picture', error)
             return Response(status_code=404)
-        return Response(jpeg, media_type='image/jpeg', headers={'Cache-Control': 'no-store'})
+        return Response(content, media_type='image/jpeg', headers=_NOT_KEPT)
+
+    @app.get(PICTURE_URL)
+    def picture() -> Response:
+        return jpeg(model.frame.picture, Picture.jpeg)
+
+    @app.get(PLAIN_PICTURE_URL)
+    def plain_picture(request: Request) -> Response:
+        """Serve the picture of a stamp [ns], the query; the newest one if it is gone."""
+        frame = model.frame
+        asked = (each for each in frame.recent if str(each.stamp_ns) == request.url.query)
+        return jpeg(next(asked, frame.picture), Picture.plain_jpeg)
+
+    @app.get(REPORT_URL)
+    def report() -> Response:
+        meeting = model.frame.meeting
+        file = None if meeting is None else report_file(meeting.report)
+        if file is None:
+            return Response(status_code=404)
+        return FileResponse(file, media_type='text/html', headers=_NOT_KEPT)
 
     return app
 

@@ -6,7 +6,7 @@ import queue
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -32,6 +32,7 @@ from ja_common.parameters import choices_of
 from ja_common.polled_subscription import PolledSubscription
 from ja_common.status_values import status_values
 from ja_common.topics import (
+    CAREGIVER_REQUEST,
     DIAGNOSTICS,
     EVERY_SCORE,
     FIXATION,
@@ -42,6 +43,7 @@ from ja_common.topics import (
     Topic,
 )
 from ja_common.weight_files_codec import decode_weight_files
+from ja_dashboard.core.meeting_view import MeetingView
 from ja_dashboard.core.view_model import CurvePoints, NodeHealth, SceneView, State, ViewModel
 from ja_dashboard.image_feed import LIMITS, MESSAGES_PER_POLL, ImageFeed, Picture
 
@@ -49,9 +51,10 @@ POLL_EVERY_S = 0.1
 _ASK_EVERY_S = 2.0
 _VIEWER_STAYS_S = 3.0
 _NICENESS = 10  # on a busy processor the graph comes first
-_SWITCHES = ('enable', 'sim/pause')
+_SWITCHES = ('enable', 'sim/pause', 'caregiver/pause')
 _TRIGGERS = (
     'home', 'save_checkpoint', 'reset_learning', 'sim/step', 'sim/rearrange',
+    'caregiver/end', 'caregiver/rearranged',
 )  # fmt: skip
 _SETTINGS = {
     'learner': 'learning_module',
@@ -94,6 +97,8 @@ class Frame:
     switches: dict[str, bool]
     scene: SceneView | None = None
     picture: Picture | None = None
+    recent: tuple[Picture, ...] = ()
+    meeting: MeetingView | None = None
 
 
 class ViewNode(GraphNode):
@@ -114,6 +119,8 @@ class ViewNode(GraphNode):
         self._viewer_s = -math.inf
         self._truth_shown = False
         self._limits: np.ndarray | None = None
+        self._meeting: MeetingView | None = None
+        self._request_s = -math.inf
         self._settings: dict[str, Any] = {}
         self._choices: dict[str, tuple[str, ...]] = {}
         self._remote = {
@@ -126,6 +133,7 @@ class ViewNode(GraphNode):
         self.subscribe(EVERY_SCORE, self._on_score)
         self.subscribe(DIAGNOSTICS, self._on_diagnostics)
         self.subscribe(LOG, self._on_log)
+        self.subscribe(CAREGIVER_REQUEST, self._on_request)
         self.subscribe(TRACK, self._on_track)
         self.subscribe(WEIGHT_FILES, self._on_weight_files)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -219,6 +227,8 @@ class ViewNode(GraphNode):
             switches=model.switches(),
             scene=feed.scene if feed else None,
             picture=feed.picture if feed else None,
+            recent=tuple(feed.recent) if feed else (),
+            meeting=self._meeting and replace(self._meeting, silent_s=now_s - self._request_s),
         )
 
     def _on_score(self, message: DiagnosticStatus) -> None:
@@ -239,6 +249,10 @@ class ViewNode(GraphNode):
     def _on_log(self, message: Log) -> None:
         if message.level >= LoggingSeverity.INFO:
             self._model.append_log(f'{message.name}: {message.msg}')
+
+    def _on_request(self, message: DiagnosticStatus) -> None:
+        self._meeting = MeetingView.of(message.message, status_values(message))
+        self._request_s = time.monotonic()
 
     def _on_track(self, message: String) -> None:
         self._model.track = message.data

@@ -8,6 +8,7 @@ from typing import Any
 
 from ja_common.core.config import ConfigError
 from ja_common.core.safe_files import load_yaml
+from ja_common.head_description import WIDE_FRAME
 from ja_runner.node_spec import NodeSpec
 from ja_runner.parts import is_installed
 
@@ -16,6 +17,9 @@ CONFIG = Path(str(files('ja_runner'))) / 'config'
 
 RECORDER = NodeSpec('ja_recording', 'recorder')
 """The first node of a graph that is recorded, so that it misses no message."""
+
+MEMORY_PARAMETERS = ('checkpoint_folder', 'trials_file')
+"""Where learner and gate keep what they know over a restart."""
 
 
 def with_arguments(graph: Sequence[NodeSpec], arguments: Sequence[str]) -> list[NodeSpec]:
@@ -54,6 +58,31 @@ def replace_nodes(graph: Sequence[NodeSpec], replacements: Sequence[str]) -> lis
         else node
         for node in graph
     ]
+
+
+def part_of_graph(
+    graph: Sequence[NodeSpec], only: str = '', without: str = ''
+) -> tuple[list[NodeSpec], list[NodeSpec]]:
+    """Split a graph into the nodes that run here and those that run on another machine.
+
+    `only` and `without` are names of nodes, separated by commas; at most one of them is not empty.
+    Raises ConfigError for a name that the graph has not, and where no node is left.
+    """
+    if only and without:
+        raise ConfigError('--only and --without exclude each other: give one of them')
+    chosen = {name for name in map(str.strip, (only or without).split(',')) if name}
+    known = [spec.executable for spec in graph]
+    if unknown := sorted(chosen - set(known)):
+        raise ConfigError(
+            f'no node {", ".join(unknown)} in this graph; there are {", ".join(known)}'
+        )
+    here, elsewhere = [], []
+    for spec in graph:
+        stays = spec.executable in chosen if only else spec.executable not in chosen
+        (here if stays else elsewhere).append(spec)
+    if not here:
+        raise ConfigError(f'no node is left to run here; there are {", ".join(known)}')
+    return here, elsewhere
 
 
 def preset(path: Path, executable: str) -> dict[str, Any]:
@@ -96,14 +125,69 @@ def rig_graph(source: str | None = None, seed: int = 0) -> list[NodeSpec]:
     that picture. Without one, the rig's own drivers publish `image_raw` and `joint_states`, and
     subscribe to `joint_commands`.
     """
+    return _configured(CONFIG / 'rig.yaml', _rig_nodes(source, seed))
+
+
+def meet_graph(
+    source: str | None = None,
+    seed: int = 0,
+    pace: float = 1.0,
+    scorer_parameters: Mapping[str, Any] | None = None,
+) -> list[NodeSpec]:
+    """Return the nodes of `rig_graph` and the scorer that asks a person to look at things.
+
+    The robot's nodes are those of a rig, with a gate that leaves her the time to turn; none of
+    them subscribes to what she is asked. `pace`: 2 is twice as fast. What is learned is saved
+    where `run_graph` puts it, not where a rig keeps it: each meeting starts from initial weights.
+    """
+    scorer = NodeSpec(
+        'ja_caregiver', 'request_scorer', {'seed': seed, **(scorer_parameters or {})}
+    )
+    graph = [*_rig_nodes(source, seed), scorer]
+    if source is not None:
+        graph = _configured(CONFIG / 'meet_digital_head.yaml', graph)
+    graph = [_at_pace(spec, pace) for spec in _configured(CONFIG / 'meet.yaml', graph)]
+    return [_without_memory(spec) for spec in _configured(CONFIG / 'rig.yaml', graph)]
+
+
+def film_graph(film_parameters: Mapping[str, Any], seed: int = 0) -> list[NodeSpec]:
+    """Return the attention nodes and the player of a film with a schedule, in lockstep.
+
+    `film_parameters`: those of the node `film_session`, which is camera, digital head and scorer.
+    The gate looks at her for as long as each look is shown.
+    """
+    film = NodeSpec('ja_caregiver', 'film_session', {'seed': seed, **film_parameters})
+    graph = [*_attention_nodes(seed), film]
+    for name in ('meet_film.yaml', 'demo_gaze_line.yaml', 'demo.yaml'):
+        graph = _configured(CONFIG / name, graph)
+    return graph
+
+
+_PACED = ('dwell_s', 'camera_s', 'least_look_s', 'answer_s')
+"""The times of `meet.yaml` that grow shorter with a faster pace."""
+
+
+def _at_pace(spec: NodeSpec, pace: float) -> NodeSpec:
+    paced = {name: spec.parameters[name] / pace for name in _PACED if name in spec.parameters}
+    return replace(spec, parameters={**spec.parameters, **paced})
+
+
+def _without_memory(spec: NodeSpec) -> NodeSpec:
+    """Return the node without the places in which a rig keeps what it learned."""
+    kept = {k: v for k, v in spec.parameters.items() if k not in MEMORY_PARAMETERS}
+    return replace(spec, parameters=kept)
+
+
+def _rig_nodes(source: str | None, seed: int) -> list[NodeSpec]:
+    """Return the attention nodes and, with a source, the digital head and its camera."""
     graph = _attention_nodes(seed)
     if source is not None:
         wide = {name: f'wide/{name}' for name in ('image_raw', 'camera_info')}
         graph += [
             NodeSpec('ja_sim', 'digital_head'),
-            NodeSpec('ja_perception', 'camera', {'source': source}, wide),
+            NodeSpec('ja_perception', 'camera', {'source': source, 'frame_id': WIDE_FRAME}, wide),
         ]
-    return _configured(CONFIG / 'rig.yaml', graph)
+    return graph
 
 
 def _attention_nodes(seed: int) -> list[NodeSpec]:

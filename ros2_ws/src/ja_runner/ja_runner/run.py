@@ -30,8 +30,15 @@ _MEMORY = {
     'gate': {'trials_file': 'trials'},
 }
 
-_COMPANIONS = {'view': 'is no live page', 'markers': 'are no markers'}
-"""The nodes of the dashboard, and what is missing without it."""
+_COMPANIONS = {
+    'view': ('ja_dashboard', 'is no live page'),
+    'markers': ('ja_dashboard', 'are no markers'),
+    'head_frames': ('ja_control', 'are no frames'),
+    'standard_outputs': ('ja_perception', 'are no standard outputs'),
+}
+"""The nodes beside a graph: the package of each, and what is missing without it."""
+_STAMPED = {'head_frames', 'standard_outputs'}
+"""Those that compare the stamps of sensors with their clock, which has to be the graph's."""
 
 
 def run_graph(
@@ -43,9 +50,12 @@ def run_graph(
     one_process: bool = False,
     view: bool = False,
     markers: bool = False,
+    frames: bool = False,
+    standard_outputs: bool = False,
     supervision: Supervision = DEFAULT,
     arguments: Sequence[str] = (),
     memory: Path | None = None,
+    elsewhere: Sequence[NodeSpec] = (),
 ) -> tuple[int, ProgressNode]:
     """Run until `done`, a signal, or a death; return the exit code and the progress node.
 
@@ -54,8 +64,10 @@ def run_graph(
     `arguments`: the ROS arguments of all nodes (the progress node gets the namespace as well).
     `memory`: the folder in which learner and gate save what they learned, and from which they
     resume if it is there; by default `folder`.
-    `view`: serve the live page beside the graph, in its own process. `markers`: the same for the
-    markers of RViz and Foxglove.
+    `view`: serve the live page beside the graph, in its own process. In the same way `markers`
+    draws for RViz and Foxglove, `frames` publishes where the frames of the head are, and
+    `standard_outputs` what was seen, in the message types of others. `elsewhere`: the nodes of the
+    graph that run on another machine, for which the parameter files may be as well.
     """
     apply_ros_defaults()
     check_ros_arguments(arguments)
@@ -63,12 +75,13 @@ def run_graph(
     for place in {folder, memory or folder}:
         check_writable(place)
     graph = [_with_memory(spec, (memory or folder).absolute()) for spec in graph]
+    wanted = (view, markers, frames, standard_outputs)
     beside_graph = [
-        NodeSpec('ja_dashboard', name, arguments=arguments)
-        for name, wanted in (('view', view), ('markers', markers))
-        if wanted
+        NodeSpec(package, name, _clock_of(graph) if name in _STAMPED else {}, arguments=arguments)
+        for (name, (package, _)), is_wanted in zip(_COMPANIONS.items(), wanted, strict=True)
+        if is_wanted
     ]
-    unread = check_parameter_files(full_names([*graph, *beside_graph]), arguments)
+    unread = check_parameter_files(full_names([*graph, *beside_graph, *elsewhere]), arguments)
     progress: list[ProgressNode] = []
 
     def make_progress_node(context: Context) -> ProgressNode:
@@ -81,9 +94,9 @@ def run_graph(
             display.print_line(f'warning: {sentence}')
         companions: list[Companion] = []
         for spec in beside_graph:
-            name = _COMPANIONS[spec.executable]
-            if not is_installed('ja_dashboard'):
-                display.print_line(f'there {name}: the dashboard is not installed')
+            if not is_installed(spec.package):
+                _, missing = _COMPANIONS[spec.executable]
+                display.print_line(f'there {missing}: {spec.package} is not installed')
                 continue
             announcement = LIVE_PAGE if spec.executable == 'view' else ''
             companion = Companion(spec, folder / 'log', display.print_line, announcement)
@@ -111,6 +124,10 @@ def check_memory(folder: Path) -> None:
     checkpoints = folder / _MEMORY['learning_module']['checkpoint_folder']
     if not list(checkpoints.glob('*.npz')):
         raise ConfigError(f'{folder} cannot be resumed: there is no checkpoint in {checkpoints}')
+
+
+def _clock_of(graph: Sequence[NodeSpec]) -> dict[str, bool]:
+    return {'use_sim_time': any(spec.parameters.get('use_sim_time') for spec in graph)}
 
 
 def _with_memory(spec: NodeSpec, folder: Path) -> NodeSpec:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ja_common.core.config import ConfigError
+from ja_runner.graph import MEMORY_PARAMETERS
 from ja_runner.node_spec import NodeSpec
 
 _DETECTOR = 'salient_feature_detector'
@@ -29,7 +30,6 @@ SENSES: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
 }
 """By sense: the parameters of each node that has a part in it."""
 
-_MEMORY = ('checkpoint_folder', 'trials_file')
 _BOTH_MEASURE_RANGES = {'depth', 'second-camera'}
 
 
@@ -77,7 +77,7 @@ def with_senses(graph: Sequence[NodeSpec], senses: Sequence[str]) -> list[NodeSp
 def _memory_of(senses: Sequence[str], parameters: Mapping[str, Any]) -> dict[str, str]:
     """Return where a node with these senses saves: in `runs/rig-eyes` for `runs/rig`."""
     suffix = ''.join(f'-{sense}' for sense in SENSES if sense in senses)
-    places = {name: Path(parameters[name]) for name in _MEMORY if parameters.get(name)}
+    places = {name: Path(parameters[name]) for name in MEMORY_PARAMETERS if parameters.get(name)}
     return {
         name: str(place.parent.with_name(place.parent.name + suffix) / place.name)
         for name, place in places.items()

@@ -3,24 +3,31 @@
 import sys
 from enum import Enum
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
 from ja_bringup.commands.options import (
+    Frames,
     HungAfter,
     Markers,
     OnDeath,
     OnDeathChoice,
     OneProcess,
+    Only,
     Record,
     Senses,
+    StandardOutputs,
     Swap,
     View,
+    Without,
 )
-from ja_runner.graph import RECORDER, replace_nodes, sim_graph, with_arguments
+from ja_runner.graph import RECORDER, part_of_graph, replace_nodes, sim_graph, with_arguments
 from ja_runner.senses import parse_senses, with_senses
 from ja_runner.supervisor import Supervision
+
+if TYPE_CHECKING:
+    from ja_sim.core.photo_head_file import PhotoHead
 
 
 class DemoLearner(str, Enum):
@@ -69,6 +76,13 @@ def demo(
             f"the paper's learner {SCENE['paper']}."
         ),
     ] = None,
+    caregiver: Annotated[
+        Optional[Path],
+        typer.Option(
+            help='A photograph of a person who looks at the camera, you for example: this face '
+            'plays the caregiver. Or a file that was made of one (.npz).'
+        ),
+    ] = None,
     draw_ahead: Annotated[
         bool,
         typer.Option(
@@ -82,11 +96,15 @@ def demo(
         typer.Option(help='Resume the run in this folder, with all that it learned.'),
     ] = None,
     senses: Senses = '',
+    only: Only = '',
+    without: Without = '',
     swap: Swap = None,
     record: Record = False,
     one_process: OneProcess = False,
     view: View = True,
     markers: Markers = False,
+    frames: Frames = False,
+    standard_outputs: StandardOutputs = False,
     on_death: OnDeath = OnDeathChoice.stop,
     hung_after_s: HungAfter = Supervision.hung_after_s,
 ) -> None:
@@ -101,8 +119,36 @@ def demo(
     arguments = context.obj or []
     sim = {'scene': scene or SCENE[learner.value], 'draw_ahead': draw_ahead}
     graph = with_senses(sim_graph(seed, sim, learner.value), parse_senses(senses))
+    graph, elsewhere = part_of_graph(graph, only, without)
     graph = replace_nodes(graph, swap or ())
     stages = standard_course(trials or PRACTICE_TRIALS[learner.value], time_s, exam_trials)
     graph = with_arguments([*[RECORDER] * record, *graph], arguments)
     supervision = Supervision(on_death.value, hung_after_s)
-    sys.exit(run_demo(graph, stages, one_process, supervision, arguments, view, resume, markers))
+    head = None if caregiver is None else _head_of(caregiver)
+    sys.exit(
+        run_demo(
+            graph,
+            stages,
+            one_process,
+            supervision,
+            arguments,
+            view,
+            resume,
+            markers,
+            head,
+            elsewhere,
+            frames,
+            standard_outputs,
+        )
+    )
+
+
+def _head_of(photo: Path) -> 'PhotoHead':
+    """Return the head of a photograph, or of the file that was made of one; raise ConfigError."""
+    from ja_caregiver.core.photo_face import PhotoFaceFinder
+    from ja_caregiver.core.photo_head import photo_head
+    from ja_sim.core.photo_head_file import read_photo_head
+
+    if photo.suffix == '.npz':
+        return read_photo_head(photo)
+    return photo_head(PhotoFaceFinder().read_photo(photo))

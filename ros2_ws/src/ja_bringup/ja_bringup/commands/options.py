@@ -38,6 +38,34 @@ Markers = Annotated[
         '--markers', help='Publish `markers` for RViz and Foxglove, while one of them reads them.'
     ),
 ]
+Only = Annotated[
+    str,
+    typer.Option(
+        '--only',
+        help='Run only these nodes of the graph here, with commas: learning_module. The others '
+        'run on another machine.',
+    ),
+]
+Without = Annotated[
+    str,
+    typer.Option('--without', help='Leave these nodes to another machine, with commas.'),
+]
+Frames = Annotated[
+    bool,
+    typer.Option(
+        '--frames',
+        help='Publish where the frames of the head are: `head/camera_pose`, and `tf` if tf2_msgs '
+        'is installed. Not beside robot_state_publisher.',
+    ),
+]
+StandardOutputs = Annotated[
+    bool,
+    typer.Option(
+        '--standard-outputs',
+        help='Publish what is seen as vision_msgs, and people as in REP-155, if those types are '
+        'installed.',
+    ),
+]
 Swap = Annotated[
     Optional[list[str]],
     typer.Option(

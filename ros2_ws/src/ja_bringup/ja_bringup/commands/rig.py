@@ -6,17 +6,21 @@ from typing import Annotated, Optional
 import typer
 
 from ja_bringup.commands.options import (
+    Frames,
     HungAfter,
     Markers,
     OnDeath,
     OnDeathChoice,
     OneProcess,
+    Only,
     Record,
     Senses,
+    StandardOutputs,
     Swap,
     View,
+    Without,
 )
-from ja_runner.graph import RECORDER, replace_nodes, rig_graph, with_arguments
+from ja_runner.graph import RECORDER, part_of_graph, replace_nodes, rig_graph, with_arguments
 from ja_runner.senses import parse_senses, with_senses
 from ja_runner.supervisor import Supervision
 
@@ -39,11 +43,15 @@ def rig(
         float, typer.Option('--time', min=0.0, help='End after so many seconds.')
     ] = 0.0,
     senses: Senses = '',
+    only: Only = '',
+    without: Without = '',
     swap: Swap = None,
     record: Record = False,
     one_process: OneProcess = False,
     view: View = True,
     markers: Markers = False,
+    frames: Frames = False,
+    standard_outputs: StandardOutputs = False,
     on_death: OnDeath = OnDeathChoice.stop,
     hung_after_s: HungAfter = Supervision.hung_after_s,
 ) -> None:
@@ -52,7 +60,9 @@ def rig(
     from ja_runner.run import run_graph
 
     arguments = context.obj or []
-    graph = replace_nodes(with_senses(rig_graph(source), parse_senses(senses)), swap or ())
+    whole = with_senses(rig_graph(source), parse_senses(senses))
+    graph, elsewhere = part_of_graph(whole, only, without)
+    graph = replace_nodes(graph, swap or ())
     code, _ = run_graph(
         with_arguments([*[RECORDER] * record, *graph], arguments),
         new_run_folder('rig'),
@@ -61,7 +71,10 @@ def rig(
         one_process=one_process,
         view=view,
         markers=markers,
+        frames=frames,
+        standard_outputs=standard_outputs,
         supervision=Supervision(on_death.value, hung_after_s),
         arguments=arguments,
+        elsewhere=with_arguments(elsewhere, arguments),
     )
     sys.exit(code)

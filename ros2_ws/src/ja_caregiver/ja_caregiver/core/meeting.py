@@ -24,10 +24,10 @@ _FORMAT = 1
 class MeetingTrial:
     """One request and what followed.
 
-    `asked`, `proposed`, `fixated`: numbers of things; None where the learner had no proposal, or
-    the trial was given up. `things`: number -> (pan, tilt) [rad] of each thing when she was
-    looked at. `followed_learner`: the gate took the learner's proposal. Pictures: file names
-    beside the meeting's file, '' where there are none.
+    `asked`, `proposed`, `fixated`: numbers of things; None where the learner had no proposal, the
+    trial was given up, or no thing with a number was fixated. `things`: number -> (pan, tilt)
+    [rad] of each thing when she was looked at. `followed_learner`: the gate took the learner's
+    proposal. Pictures: file names beside the meeting's file, '' where there are none.
     """
 
     trial: int
