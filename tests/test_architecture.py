@@ -51,7 +51,7 @@ def is_text(node: ast.AST | None) -> bool:
 
 
 def test_sources_were_found():
-    assert len(PACKAGES) == 13
+    assert len(PACKAGES) == 14
     assert len(NODES) >= 8
 
 

@@ -193,3 +193,30 @@ def test_looks_with_senses_hold_what_was_measured_and_what_is_true(tmp_path: Pat
     known = np.isfinite(yaw)
     assert known.mean() > 0.5
     assert np.corrcoef(yaw[known], found.directions[known, 0])[0, 1] > 0.8
+
+
+def test_a_photo_has_its_own_looks_by_its_content(tmp_path: Path, renderer: Renderer) -> None:
+    photo, elsewhere = tmp_path / 'me.npz', tmp_path / 'other' / 'me.npz'
+    elsewhere.parent.mkdir()
+
+    def load_with(path: Path | None) -> list[str]:
+        lines: list[str] = []
+        load_looks(
+            count=125,
+            folder=tmp_path / 'cache',
+            report=lines.append,
+            render=renderer,
+            photo='' if path is None else str(path),
+        )
+        return lines
+
+    photo.write_bytes(b'one')
+    elsewhere.write_bytes(b'one')
+    load_with(None)
+    load_with(photo)
+    load_with(photo)
+    assert renderer.times == 2
+    assert load_with(elsewhere) == [], 'the same photograph in another place'
+    photo.write_bytes(b'two')
+    (line,) = load_with(photo)
+    assert 'made with other photo' in line

@@ -150,7 +150,7 @@ def render_looks(orders: Iterable[LooksOrder]) -> None:
 
 
 def _render_order(order: LooksOrder) -> None:
-    load_looks(order.scene, order.seed, order.count, senses=order.senses)
+    load_looks(order.scene, order.seed, order.count, senses=order.senses, photo=order.photo)
 
 
 def next_seed(seeds: range, seed: int) -> int:

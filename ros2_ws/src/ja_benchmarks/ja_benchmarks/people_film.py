@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 import cv2
-import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -25,12 +24,9 @@ from ja_sim.core.caregiver import (
     SHIRT_COLOURS,
     SKIN_TONES,
     Appearance,
-    CaregiverBodies,
     identities,
 )
-from ja_sim.core.gaze import GazePose
-from ja_sim.core.render import Renderer, buffer_size
-from ja_sim.core.specs import CaregiverSpec
+from ja_sim.core.person_renderer import PersonRenderer
 
 Picture = NDArray[np.uint8]
 
@@ -45,7 +41,6 @@ _CUTOUT_PX = (560, 720)
 _CUTOUT_FOCAL_PX = 800.0  # at a distance of 1 m: pixels a metre
 _YAW_STEP_RAD = math.radians(10)
 _ROW_TIME_S = 0.025  # from the first row of a picture to the last
-_FAR_M = 3.0
 
 
 @dataclass(frozen=True)
@@ -176,44 +171,9 @@ def draw_people(count: int, rng: np.random.Generator) -> list[Appearance]:
     ]
 
 
-class _PersonRenderer:
-    """One person before a black background, 1 m away, drawn with any turn of the head."""
-
-    def __init__(self) -> None:
-        spec = mujoco.MjSpec()
-        self._bodies = CaregiverBodies(spec, CaregiverSpec(distance_m=1.0))
-        spec.worldbody.add_light(pos=[0.0, 0.6, 0.8], dir=[0.8, -0.4, -0.5], diffuse=[0.7] * 3)
-        spec.visual.headlight.ambient[:] = 0.35
-        body = spec.worldbody.add_body(name='camera')
-        body.add_camera(
-            name='eye', quat=[0.5, 0.5, -0.5, -0.5], resolution=list(_CUTOUT_PX),
-            sensor_size=list(_CUTOUT_PX), focal_pixel=[_CUTOUT_FOCAL_PX] * 2,
-        )  # fmt: skip
-        size = buffer_size(_CUTOUT_PX)
-        spec.visual.global_.offwidth, spec.visual.global_.offheight = size
-        self._model = spec.compile()
-        self._data = mujoco.MjData(self._model)
-        self._bodies.bind_model(self._model)
-        self._renderer: Renderer | None = None
-
-    def draw(self, appearance: Appearance, yaw: float) -> tuple[Picture, NDArray[np.float32]]:
-        self._bodies.apply_appearance(appearance)
-        self._bodies.place(self._data, GazePose(np.array([yaw, 0.0]), np.zeros((2, 2))), False)
-        self._bodies.place_arm(self._data, None)
-        mujoco.mj_kinematics(self._model, self._data)
-        mujoco.mj_camlight(self._model, self._data)
-        if self._renderer is None:
-            self._renderer = Renderer(self._model, self._data, 'eye', _CUTOUT_PX)
-        picture = self._renderer.draw('eye')
-        mask = (self._renderer.read_depth() < _FAR_M).astype(np.float32)
-        # A little inwards: at the edge the black background shines through.
-        mask = cv2.GaussianBlur(cv2.erode(mask, np.ones((3, 3))), (5, 5), 0)
-        return picture, mask
-
-
 @lru_cache(maxsize=1)
-def _person_renderer() -> _PersonRenderer:
-    return _PersonRenderer()
+def _person_renderer() -> PersonRenderer:
+    return PersonRenderer(_CUTOUT_PX, _CUTOUT_FOCAL_PX)
 
 
 @lru_cache(maxsize=64)

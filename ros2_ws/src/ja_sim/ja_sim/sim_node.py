@@ -14,7 +14,7 @@ from rclpy.clock import ClockType
 from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image, JointState, PointCloud2
-from std_msgs.msg import Header
+from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, Trigger
 
 from ja_common.camera_info_codec import encode_camera_info
@@ -23,6 +23,7 @@ from ja_common.core.health import Level
 from ja_common.core.stamps import NS_PER_S
 from ja_common.depth_encoder import DEPTH_ENCODINGS, encode_depth
 from ja_common.graph_node import GraphNode
+from ja_common.head_description import BASE_FRAME, CAMERA_FRAME, describe_head
 from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.node_main import spin_node
@@ -36,6 +37,7 @@ from ja_common.topics import (
     JOINT_STATES,
     RIGHT_CAMERA_INFO,
     RIGHT_IMAGE,
+    ROBOT_DESCRIPTION,
     SIM_TRUTH,
     Topic,
 )
@@ -44,10 +46,6 @@ from ja_sim.core.pace import Pace
 from ja_sim.core.scene import Scene, load_scene
 from ja_sim.core.world import JointAttentionWorld
 from ja_sim.truth_codec import encode_truth
-
-CAMERA_FRAME = 'camera_optical_frame'
-BASE_FRAME = 'base_link'
-"""The frame in which the pan-tilt head stands; the positions of the truth are in it."""
 
 CLOCK_RATE_HZ = 100.0
 """In real time the clock passes in steps of this rate [1/s of wall time], between images too."""
@@ -86,6 +84,10 @@ class SimConfig(Configuration):
     second_camera: str = parameter(
         'scene', 'a second camera to the right: as in the scene, on, or off',
         choices=('scene', 'on', 'off'),
+    )  # fmt: skip
+    photo: str = parameter(
+        '', 'file (.npz) with the head of a photograph, which plays the caregiver; empty: as in '
+        'the scene'
     )  # fmt: skip
     resend_after_s: float = parameter(
         0.5, 'in lockstep or a pause: time after which the last image is sent again',
@@ -128,7 +130,8 @@ class SimNode(GraphNode):
         super().__init__('sim', **node_kwargs)
         self._config = self.configure(SimConfig)
         self._live = self.configure(LiveConfig, self._on_live_config)
-        self._joints = JointCodec(self.configure(JointConfig))
+        joints = self.configure(JointConfig)
+        self._joints = JointCodec(joints)
         # An OpenGL context belongs to one thread: this one makes the worlds and draws them.
         self._render_thread, self._closed = ThreadPoolExecutor(1, 'render'), False
         self._world = self._in_render_thread(self._make_world, self._live.objects)
@@ -144,6 +147,7 @@ class SimNode(GraphNode):
             for topic in (DEPTH, RIGHT_CAMERA_INFO, RIGHT_IMAGE)
         }
         self._image = self.create_topic_publisher(IMAGE)
+        self._publish_description(joints)
         self.advertise_service(Trigger, 'sim/reset', self._on_reset)
         self.advertise_service(SetBool, 'sim/pause', self._on_pause)
         self.advertise_service(Trigger, 'sim/step', self._on_step)
@@ -172,6 +176,13 @@ class SimNode(GraphNode):
             self._in_render_thread(self._world.close)
             self._render_thread.shutdown()
         super().destroy_node()
+
+    def _publish_description(self, joints: JointConfig) -> None:
+        head = self._world.scene.head
+        max_speed = math.radians(head.speed_limit_deg_s) or None  # None: of the file
+        description = describe_head(joints, self._world.limits, max_speed)
+        self._robot_description = self.create_topic_publisher(ROBOT_DESCRIPTION)
+        self._robot_description.publish(String(data=description))
 
     def _on_command(self, message: JointState) -> None:
         answers_image = message.header.stamp == self._round.image.header.stamp
@@ -364,6 +375,8 @@ class SimNode(GraphNode):
 
     def _make_world(self, objects: int) -> JointAttentionWorld:
         scene = self._with_senses(load_scene(self._config.scene))
+        if self._config.photo:
+            scene = replace(scene, caregiver=replace(scene.caregiver, photo=self._config.photo))
         if objects:
             scene = replace(scene, objects=replace(scene.objects, count=objects))
         self.health.values['objects'] = str(scene.objects.count)

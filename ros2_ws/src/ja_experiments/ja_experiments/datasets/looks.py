@@ -37,7 +37,7 @@ from ja_experiments.config import ExperimentConfig
 from ja_experiments.datasets.rendered import DWELL_S, RenderedStep, RenderedTask
 from ja_learning.core.trial import SAME_OBJECT_RAD
 from ja_perception.core.gaze_reader import GazeReader
-from ja_sim.core.scene import load_scene
+from ja_sim.core.scene import Scene, load_scene
 from ja_sim.core.world import JointAttentionWorld
 
 POOL = 125
@@ -112,7 +112,7 @@ class LooksOrder:
     """Which looks: at the caregiver of a scene and seed, so many, at (width, height) [px].
 
     `senses`: the robot has a reader of landmarks, and a depth sensor, if the scene does not name
-    another.
+    another. `photo`: file with the head of a photograph, which plays her; '': as in the scene.
     """
 
     scene: str
@@ -120,6 +120,14 @@ class LooksOrder:
     count: int
     senses: bool = False
     image_size: tuple[int, int] = IMAGE_SIZE
+    photo: str = ''
+
+    def load_scene(self) -> Scene:
+        """Return the scene, with the photograph that plays her. Raises SceneError."""
+        scene = load_scene(self.scene)
+        if not self.photo:
+            return scene
+        return replace(scene, caregiver=replace(scene.caregiver, photo=self.photo))
 
     @property
     def name(self) -> str:
@@ -129,6 +137,8 @@ class LooksOrder:
             name += '-senses'
         if self.image_size != IMAGE_SIZE:
             name += '-{}x{}'.format(*self.image_size)
+        if self.photo:
+            name += f'-{Path(self.photo).stem}'
         return name
 
 
@@ -146,16 +156,17 @@ def load_looks(
     render: Render | None = None,
     senses: bool = False,
     image_size: tuple[int, int] = IMAGE_SIZE,
+    photo: str = '',
 ) -> Looks:
     """Return looks at the caregiver of a scene and seed, from `folder` or newly rendered.
 
     Cached looks are used only if their checksum is right and if what made them is unchanged:
     the arguments, sources of the sim and of the perception, libraries. `report` receives one line
     when looks are rendered, `progress` the number of looks that are finished since its last call.
-    `render`: makes the looks; None: the rendered world. `senses`, `image_size`: as in
+    `render`: makes the looks; None: the rendered world. `senses`, `image_size`, `photo`: as in
     `LooksOrder`.
     """
-    order = LooksOrder(scene, seed, count, senses, image_size)
+    order = LooksOrder(scene, seed, count, senses, image_size, photo)
     kept = (folder or cache_folder()) / order.name
     maker = _maker(order)
     try:
@@ -219,8 +230,12 @@ def _write(kept: Path, maker: dict[str, Any], looks: Looks) -> None:
 
 def _maker(order: LooksOrder) -> dict[str, Any]:
     """Return everything that the looks depend on."""
+    scene = order.load_scene()
+    photo = scene.caregiver.photo
     return {
-        'scene': repr(load_scene(order.scene)),
+        # The photograph by its content: its file may stand anywhere.
+        'scene': repr(replace(scene, caregiver=replace(scene.caregiver, photo=''))),
+        'photo': _sha256([read_bytes(Path(photo), _LARGEST_BYTES)]) if photo else '',
         'seed': order.seed,
         'count': order.count,
         'senses': order.senses,
@@ -271,7 +286,7 @@ def _render(order: LooksOrder, progress: Callable[[int], None]) -> Looks:
     config = ExperimentConfig().with_settings(
         {'dwell_s': DWELL_S, 'max_shifts': 1, 'gating': 'constant', 'p_lm_max': 1.0}
     )
-    scene = load_scene(order.scene)
+    scene = order.load_scene()
     if order.senses and scene.senses.depth == 'none':
         scene = replace(scene, senses=replace(scene.senses, depth='sensor'))
     world = JointAttentionWorld(scene, order.seed, order.image_size)

@@ -8,14 +8,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
+import cv2
 import mujoco
 import numpy as np
 
 from ja_common.core.config import ConfigError
 from ja_common.core.geometry import head_rotation, vectors_of_directions
 from ja_sim.core.gaze import GazePose
+from ja_sim.core.photo_head_file import PhotoHead, read_photo_head
 from ja_sim.core.specs import CaregiverSpec
 
 SKIN_TONES = (
@@ -32,6 +35,7 @@ SIDES = ('left', 'right')
 ARM_RADIUS_M, HAND_SIZE_M = 0.035, (0.03, 0.022, 0.045)
 SHOULDER = np.array([0.0, 0.17, -0.14])  # of the left arm, in the rest frame [m]
 _SKIN_FILE = 'caregiver_skin.png'
+_PHOTO_SHIRT = 'chiyo'  # whose shirt a head of a photograph wears: the narrowest
 _SHOWN, _HIDDEN = 0, 5  # groups of geoms: MuJoCo draws the first three
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
 _CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
@@ -88,11 +92,16 @@ class CaregiverBodies:
         direction = np.radians([caregiver.pan_deg, caregiver.tilt_deg])
         self._face_at = caregiver.distance_m * vectors_of_directions(direction)
         self._facing = head_rotation([direction[0] + np.pi, 0.0])
+        self._photo = read_photo_head(Path(caregiver.photo)) if caregiver.photo else None
         _add_skin(spec)
         head = spec.worldbody.add_body(name='caregiver_head', mocap=True)
         torso = spec.worldbody.add_body(name='caregiver_torso', mocap=True)
-        for name in identities():
-            _add_person(spec, head, torso, name)
+        if self._photo is None:
+            for name in identities():
+                _add_person(spec, head, torso, name)
+        else:
+            _add_photo_head(spec, head, self._photo)
+            _add_part(spec, torso, _PHOTO_SHIRT, 'shirt', 'cloth')
         arm = spec.worldbody.add_body(name='caregiver_arm', mocap=True)
         arm.add_geom(name='arm', type=_CAPSULE, size=[ARM_RADIUS_M, 0.3, 0.0], material='cloth')
         arm.add_geom(name='hand', type=_ELLIPSOID, size=HAND_SIZE_M, material='skin')
@@ -108,6 +117,11 @@ class CaregiverBodies:
                     material='skin' if part == 'lid' else 'eye',
                 )
 
+    @property
+    def eyes_turn(self) -> bool:
+        """Return whether her eyes turn in her head; those of a photograph do not."""
+        return self._photo is None
+
     def bind_model(self, model: mujoco.MjModel) -> None:
         """Look up the ids of what moves in the compiled model."""
         self._model = model
@@ -117,12 +131,21 @@ class CaregiverBodies:
         self._arm_mocap = model.body('caregiver_arm').mocapid[0]
         self._arm, self._hand = model.geom('arm').id, model.geom('hand').id
         self._lids = [model.geom(f'{side}_lid').id for side in SIDES]
+        self._eye_parts = [
+            model.geom(f'{s}_{p}').id for s in SIDES for p in ('white', 'iris', 'pupil')
+        ]
         parts = [model.geom(f'{s}_{p}').id for s in SIDES for p in ('iris', 'pupil')]
         parts += [self._arm, self._hand]
         model.geom_sameframe[parts] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
 
     def apply_appearance(self, appearance: Appearance) -> None:
-        """Show a person: meshes, eyes and colours; nothing is recompiled."""
+        """Show a person: meshes, eyes and colours; nothing is recompiled.
+
+        A photograph shows its own person instead.
+        """
+        if self._photo is not None:
+            self._apply_photo(self._photo)
+            return
         asset, model = _asset(), self._model
         self.eyes = asset[f'{appearance.identity}.eyes'].astype(float)
         self.face = asset[f'{appearance.identity}.face'].astype(float)
@@ -143,6 +166,15 @@ class CaregiverBodies:
         radius = float(asset[f'{appearance.identity}.eye_radius'])
         for side in SIDES:
             self._apply_eye_appearance(side, radius, appearance)
+
+    def _apply_photo(self, photo: PhotoHead) -> None:
+        model = self._model
+        self.eyes, self.face = photo.eyes, photo.face
+        self.origin = self._face_at - self._facing @ self.face
+        model.geom_rgba[model.geom(f'{_PHOTO_SHIRT}_shirt').id, :3] = photo.shirt
+        model.geom_rgba[self._arm, :3], model.geom_rgba[self._hand, :3] = photo.shirt, photo.skin
+        # The photographed eyes are part of the texture.
+        model.geom_group[[*self._eye_parts, *self._lids]] = _HIDDEN
 
     def _apply_eye_appearance(self, side: str, radius: float, appearance: Appearance) -> None:
         lid_skin = tuple(0.85 * value for value in appearance.skin)
@@ -176,7 +208,8 @@ class CaregiverBodies:
         for mocap, rotation, offset in zip(self._mocap, rotations, offsets, strict=True):
             data.mocap_pos[mocap] = self.origin + head @ offset
             mujoco.mju_mat2Quat(data.mocap_quat[mocap], rotation.ravel())
-        self._model.geom_group[self._lids] = _SHOWN if eyes_closed else _HIDDEN
+        if self._photo is None:
+            self._model.geom_group[self._lids] = _SHOWN if eyes_closed else _HIDDEN
 
     def place_arm(self, data: mujoco.MjData, hand: np.ndarray | None) -> None:
         """Stretch the nearer arm out to a point (3,) [m]; None hides it: both arms hang."""
@@ -197,39 +230,67 @@ class CaregiverBodies:
 def _add_skin(spec: mujoco.MjSpec) -> None:
     """Add the painted skin, and materials that take their colour from each geom."""
     picture = resources.files('ja_sim') / 'assets' / _SKIN_FILE
-    spec.assets = {**spec.assets, _SKIN_FILE: picture.read_bytes()}
-    spec.add_texture(name='skin', type=mujoco.mjtTexture.mjTEXTURE_2D, file=_SKIN_FILE)
-    layers = [''] * int(mujoco.mjtTextureRole.mjNTEXROLE)
-    layers[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = 'skin'
-    spec.add_material(name='painted_skin', textures=layers, specular=0.08, shininess=0.2)
+    _add_textured_material(spec, 'skin', picture.read_bytes(), specular=0.08, shininess=0.2)
     spec.add_material(name='skin', specular=0.08, shininess=0.2)
     spec.add_material(name='hair', specular=0.15, shininess=0.3)
     spec.add_material(name='cloth', specular=0.0)
     spec.add_material(name='eye', specular=0.3, shininess=0.8)
 
 
+def _add_textured_material(
+    spec: mujoco.MjSpec, texture: str, png: bytes, specular: float, shininess: float
+) -> str:
+    """Add a picture as a texture, and a material that shows it; return the material's name."""
+    file, material = f'caregiver_{texture}.png', f'painted_{texture}'
+    spec.assets = {**spec.assets, file: png}
+    spec.add_texture(name=texture, type=mujoco.mjtTexture.mjTEXTURE_2D, file=file)
+    layers = [''] * int(mujoco.mjtTextureRole.mjNTEXROLE)
+    layers[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = texture
+    spec.add_material(name=material, textures=layers, specular=specular, shininess=shininess)
+    return material
+
+
 def _add_person(
     spec: mujoco.MjSpec, head: mujoco.MjsBody, torso: mujoco.MjsBody, name: str
 ) -> None:
+    _add_part(spec, head, name, 'head', 'painted_skin')
+    _add_part(spec, head, name, 'hair', 'hair')
+    _add_part(spec, torso, name, 'shirt', 'cloth')
+
+
+def _add_part(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, part: str, material: str
+) -> None:
+    """Add the head, the hair or the shirt of a person of the asset."""
     asset = _asset()
-    uv = asset['head_uv']
-    parts = (
-        ('head', head, 'painted_skin', asset['head_faces']),
-        ('hair', head, 'hair', asset[f'{name}.hair_faces']),
-        ('shirt', torso, 'cloth', asset['shirt_faces']),
+    faces = asset[f'{name}.hair_faces' if part == 'hair' else f'{part}_faces']
+    mesh = _add_mesh(spec, f'{name}_{part}', asset[f'{name}.{part}'], faces)
+    if part == 'head':
+        mesh.usernormal = asset[f'{name}.normals'].ravel()
+        mesh.usertexcoord = asset['head_uv'].ravel()
+    _add_mesh_geom(body, mesh.name, material)
+
+
+def _add_photo_head(spec: mujoco.MjSpec, body: mujoco.MjsBody, photo: PhotoHead) -> None:
+    """Add a head with its photograph as the texture."""
+    png = cv2.imencode('.png', cv2.cvtColor(photo.texture, cv2.COLOR_RGB2BGR))[1]
+    name = _add_textured_material(spec, 'photo', png.tobytes(), specular=0.0, shininess=0.0)
+    mesh = _add_mesh(spec, 'photo_head', photo.vertices, photo.faces)
+    mesh.usertexcoord = photo.uv.ravel()
+    _add_mesh_geom(body, mesh.name, name)
+
+
+def _add_mesh(
+    spec: mujoco.MjSpec, name: str, vertices: np.ndarray, faces: np.ndarray
+) -> mujoco.MjsMesh:
+    # Open surfaces have no volume to weigh.
+    mesh = spec.add_mesh(name=name, inertia=_SHELL)
+    mesh.uservert = vertices.ravel()
+    mesh.userface = faces.ravel().astype(np.int32)
+    return mesh
+
+
+def _add_mesh_geom(body: mujoco.MjsBody, mesh: str, material: str) -> None:
+    body.add_geom(
+        name=mesh, type=_MESH, meshname=mesh, material=material, rgba=[1.0, 1.0, 1.0, 1.0]
     )
-    for part, body, material, faces in parts:
-        # Open surfaces have no volume to weigh.
-        mesh = spec.add_mesh(name=f'{name}_{part}', inertia=_SHELL)
-        mesh.uservert = asset[f'{name}.{part}'].ravel()
-        mesh.userface = faces.ravel().astype(np.int32)
-        if part == 'head':
-            mesh.usernormal = asset[f'{name}.normals'].ravel()
-            mesh.usertexcoord = uv.ravel()
-        body.add_geom(
-            name=mesh.name,
-            type=_MESH,
-            meshname=mesh.name,
-            material=material,
-            rgba=[1.0, 1.0, 1.0, 1.0],
-        )

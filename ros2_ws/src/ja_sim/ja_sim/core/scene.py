@@ -65,11 +65,20 @@ def load_scene(name_or_path: str) -> Scene:
     try:
         root = compose_yaml(read_text(path), str(path))
         scene = Scene(name=path.stem)
-        return _Reader(path).read(Scene, root, scene) if root else scene
+        return _with_photo_beside(path, _Reader(path).read(Scene, root, scene)) if root else scene
     except SceneError:
         raise
     except ConfigError as error:
         raise SceneError(str(error)) from None
+
+
+def _with_photo_beside(path: Path, scene: Scene) -> Scene:
+    """Return the scene with a relative path of her photograph taken from the scene's folder."""
+    photo = scene.caregiver.photo
+    if not photo:
+        return scene
+    caregiver = dataclasses.replace(scene.caregiver, photo=str(path.parent / photo))
+    return dataclasses.replace(scene, caregiver=caregiver)
 
 
 class _Reader:

@@ -84,6 +84,9 @@ class CaregiverSpec(Configuration):
     """Who she is, where she sits and how she behaves."""
 
     identity: str = parameter('any', "A name in the asset, or 'any': drawn at each reset")
+    photo: str = parameter(
+        '', 'File (.npz) with a head made from a photograph, which then plays her; empty for none'
+    )
     distance_m: float = parameter(1.2, 'From the robot to her face', low=0.6, high=4.0)
     pan_deg: float = parameter(0.0, 'Where her face is', low=-60.0, high=60.0)
     tilt_deg: float = parameter(0.0, 'Where her face is', low=-20.0, high=20.0)
