@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import PointStamped
+from geometry_msgs.msg import PointStamped, PoseStamped
 from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
@@ -166,7 +166,16 @@ FORWARD_COMMANDS = Topic(
     **_LINK,
 )
 ROBOT_DESCRIPTION = Topic(
-    'robot_description', String, 'URDF, from which the gate may take joint limits', **_LATCHED
+    'robot_description',
+    String,
+    'URDF of the head: its frames and, where so configured, the joint limits of the gate',
+    **_LATCHED,
+)
+CAMERA_POSE = Topic(
+    'head/camera_pose',
+    PoseStamped,
+    'where the optical frame of the camera is in the base frame, by the URDF and joint_states',
+    **_SENSOR,
 )
 GATE_STATUS = Topic(
     'gate/status', DiagnosticStatus, 'phase, source, p(LM), limits, reason of a hold', **_LINK

@@ -16,6 +16,7 @@ from ja_common.core.config import Configuration, parameter
 from ja_common.core.health import Level
 from ja_common.core.stamps import NS_PER_S
 from ja_common.graph_node import GraphNode
+from ja_common.head_description import CAMERA_FRAME
 from ja_common.image_codec import encode_image
 from ja_common.node_main import spin_node
 from ja_common.topics import CAMERA_INFO, IMAGE
@@ -49,7 +50,7 @@ class CameraConfig(Configuration):
     field_of_view_rad: float = parameter(
         math.radians(60), 'horizontal view of the camera', low=0.01, high=3.0
     )
-    frame_id: str = parameter('camera_optical_frame', 'optical frame named in the headers')
+    frame_id: str = parameter(CAMERA_FRAME, 'optical frame named in the headers')
 
 
 class CameraNode(GraphNode):

@@ -66,7 +66,7 @@ def axis_in_root(robot: ElementTree.Element, joint: ElementTree.Element) -> NDAr
 
     Raises ValueError for an axis or an origin that is not 3 numbers, or joints that form a loop.
     """
-    axis = _vector(joint.find('axis'), 'xyz', '1 0 0')
+    axis = read_vector(joint.find('axis'), 'xyz', '1 0 0')
     turned = _rotation_to_root(joint, robot.findall('joint')) @ axis
     return turned / max(float(np.linalg.norm(turned)), 1e-12)
 
@@ -93,20 +93,21 @@ def _rotation_to_root(
     joint: ElementTree.Element, joints: list[ElementTree.Element]
 ) -> NDArray[np.float64]:
     """Rotation (3, 3) from the joint's frame to the root link's."""
-    by_child = {_link(j, 'child'): j for j in joints}
+    by_child = {link_of(j, 'child'): j for j in joints}
     rotation = np.eye(3)
     current: ElementTree.Element | None = joint
     for _ in range(len(joints)):
         if current is None:
             return rotation
-        rotation = _rpy(_vector(current.find('origin'), 'rpy', '0 0 0')) @ rotation
-        current = by_child.get(_link(current, 'parent'))
+        rotation = _rpy(read_vector(current.find('origin'), 'rpy', '0 0 0')) @ rotation
+        current = by_child.get(link_of(current, 'parent'))
     if current is not None:
         raise ValueError('the joints of the robot description form a loop')
     return rotation
 
 
-def _link(joint: ElementTree.Element, role: str) -> str:
+def link_of(joint: ElementTree.Element, role: str) -> str:
+    """Return the link that a joint names as its parent or child (`role`); '' without one."""
     element = joint.find(role)
     return '' if element is None else element.get('link', '')
 
@@ -123,9 +124,13 @@ def _rpy(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     )
 
 
-def _vector(
+def read_vector(
     element: ElementTree.Element | None, attribute: str, default: str
 ) -> NDArray[np.float64]:
+    """Return the 3 numbers (3,) of an attribute, those of `default` where it is not stated.
+
+    Raises ValueError for anything else.
+    """
     text = default if element is None else element.get(attribute, default)
     what = f'{attribute}="{text[:40]}" of the robot description'
     refuse_xacro(text, what)
