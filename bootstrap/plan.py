@@ -7,7 +7,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 SUPPORTED = ((3, 10), (3, 13))
-ROS_DISTRO = 'jazzy'
+
+DISTRO_LOCKS = {'jazzy': 'ros.lock', 'kilted': 'ros-kilted.lock'}
+"""The ROS distributions that the graph runs on, and the lock file of the wheels of each."""
+
+JA_ROS_DISTRO = 'JA_ROS_DISTRO'
+"""Environment variable: which distribution's wheels are installed where none is sourced."""
 
 PARTS = {
     'sim': ('ja_sim',),
@@ -51,17 +56,38 @@ class SystemPackage:
 
 
 def ros_is_sourced(environ: Mapping[str, str]) -> bool:
-    """Return whether ROS 2 Jazzy is sourced.
+    """Return whether a ROS 2 is sourced on which the graph runs.
 
-    Raises BootstrapError when it is another distribution.
+    Raises BootstrapError when it is another distribution, or not the one of JA_ROS_DISTRO.
     """
-    distro = environ.get('ROS_DISTRO', '')
-    if distro and distro != ROS_DISTRO:
+    distro, wanted = environ.get('ROS_DISTRO', ''), environ.get(JA_ROS_DISTRO, '')
+    if distro and distro not in DISTRO_LOCKS:
         raise BootstrapError(
-            f'ROS 2 {distro} is sourced here, but this system runs on {ROS_DISTRO}: open a shell '
-            f'without it, or source {ROS_DISTRO}'
+            f'ROS 2 {distro} is sourced here, but this system runs on {_or(DISTRO_LOCKS)}: open a '
+            f'shell without it, or source {_or(DISTRO_LOCKS)}'
+        )
+    if distro and wanted and distro != wanted:
+        raise BootstrapError(
+            f'ROS 2 {distro} is sourced here, but {JA_ROS_DISTRO} is {wanted}: unset it to use '
+            'the sourced one, or open a shell without ROS'
         )
     return bool(distro)
+
+
+def distro_of_wheels(wanted: str | None, installed: str | None = None) -> str:
+    """Return which distribution's wheels to install.
+
+    `wanted` is the user's JA_ROS_DISTRO; without it those that are installed stay, and the first
+    ones are of Jazzy. Raises BootstrapError for one on which the graph does not run.
+    """
+    distro = wanted or installed or 'jazzy'
+    if distro not in DISTRO_LOCKS:
+        raise BootstrapError(f'{JA_ROS_DISTRO}={distro}: this system runs on {_or(DISTRO_LOCKS)}')
+    return distro
+
+
+def _or(names: Iterable[str]) -> str:
+    return ' or '.join(names)
 
 
 def parts_left_out(text: str) -> tuple[str, ...]:
@@ -105,7 +131,7 @@ def choose_python(
         if python.has_rclpy:
             return python
     raise BootstrapError(
-        f'ROS 2 {ROS_DISTRO} is sourced, but no Python here can import its rclpy: name the one it '
+        'ROS 2 is sourced, but no Python here can import its rclpy: name the one it '
         'was built for with JA_PYTHON=/path/to/python, or open a shell without ROS'
     )
 
@@ -132,11 +158,13 @@ def is_stamp(stamp: object) -> bool:
     if not isinstance(stamp, dict):
         return False
     python, without = stamp.get('python', {}), stamp.get('without', [])
+    distro = stamp.get('ros', 'jazzy')
     version = python.get('version', [0, 0]) if isinstance(python, dict) else None
     return (
         isinstance(version, list)
         and [type(part) for part in version] == [int, int]
         and (python == {} or isinstance(python.get('executable'), str))
+        and isinstance(distro, str)
         and isinstance(without, list)
         and all(isinstance(part, str) for part in without)
     )

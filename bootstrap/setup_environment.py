@@ -16,6 +16,8 @@ from pathlib import Path
 
 from bootstrap import machine
 from bootstrap.plan import (
+    DISTRO_LOCKS,
+    JA_ROS_DISTRO,
     NO_SYSTEM_PACKAGES,
     PARTS,
     BootstrapError,
@@ -24,6 +26,7 @@ from bootstrap.plan import (
     SystemPackage,
     apt_advice,
     choose_python,
+    distro_of_wheels,
     fingerprint,
     is_stamp,
     left_out,
@@ -104,6 +107,10 @@ class Environment:
             text = ' '.join(self._stamp().get('without', ()))
         return parts_left_out(text)
 
+    def _distro(self) -> str:
+        """Return which wheels of ROS to install: JA_ROS_DISTRO, or else those of the last run."""
+        return distro_of_wheels(self.environ.get(JA_ROS_DISTRO), self._stamp().get('ros'))
+
     def _is_ready(self, sourced: bool, extra: Sequence[str], without: Sequence[str]) -> bool:
         """Return whether nothing is to do, without starting an interpreter."""
         wanted = self.environ.get('JA_PYTHON')
@@ -127,14 +134,15 @@ class Environment:
         without: Sequence[str],
     ) -> list[Step]:
         """Return the steps in their order: each needs those before it."""
-        locks = self.root / 'requirements'
+        locks, distro = self.root / 'requirements', self._distro()
         wanted = [
-            *([] if sourced else ['ros.lock']),
+            *([] if sourced else [DISTRO_LOCKS[distro]]),
             'base.lock',
             TORCH_LOCK,
             *(f'{part}.lock' for part in PARTS if part not in without),
         ]
-        ros = self.environ.get('AMENT_PREFIX_PATH', '') if sourced else 'wheels'
+        wheels = 'wheels' if distro == 'jazzy' else f'{distro} wheels'
+        ros = self.environ.get('AMENT_PREFIX_PATH', '') if sourced else wheels
         steps = [
             Step('environment', fingerprint('{}.{}'.format(*version), ros, str(self.root))),
             *(Step(lock, fingerprint((locks / lock).read_bytes())) for lock in wanted),
@@ -181,6 +189,7 @@ class Environment:
             self.report(
                 'making the virtual environment .venv (Python {}.{})'.format(*python.version)
             )
+            distro = self._distro()
             self._write_stamp({})
             self._run([python.executable, '-I', '-m', 'venv', '--clear', str(self.folder)])
             asked = shutil.which(self.environ.get('JA_PYTHON', '')) or python.executable
@@ -192,8 +201,9 @@ class Environment:
                     'asked': asked,
                 },
             )
-            # At once: an interrupted set-up continues with the same parts.
+            # At once: an interrupted set-up continues with the same parts and the same ROS.
             self._record('without', list(without))
+            self._record('ros', distro)
         elif step.name == 'packages':
             self.report('installing the packages of ros2_ws')
             self._pip(

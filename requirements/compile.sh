@@ -23,6 +23,7 @@ for part in ros sim dashboard experiments dev docs; do
     "${compile[@]}" "$part.in" "${constraints[@]}" --output-file "$part.lock"
     constraints+=(--constraint "$part.lock")
 done
+"${compile[@]}" ros-kilted.in --constraint base.lock --output-file ros-kilted.lock
 "${compile[@]}" "${without[@]/#/--no-emit-package=}" ppo.in "${constraints[@]}" \
     --constraint base.in --output-file ppo.lock
 {

@@ -9,6 +9,7 @@ from bootstrap.plan import (
     SystemPackage,
     apt_advice,
     choose_python,
+    distro_of_wheels,
     fingerprint,
     parts_left_out,
     ros_is_sourced,
@@ -44,11 +45,26 @@ def test_a_wrong_ja_python_is_named():
         choose_python([], wanted='nonsense')
 
 
-def test_only_jazzy_may_be_sourced():
+def test_only_distributions_that_the_graph_runs_on_may_be_sourced():
     assert not ros_is_sourced({})
-    assert ros_is_sourced({'ROS_DISTRO': 'jazzy'})
-    with pytest.raises(BootstrapError, match='ROS 2 humble is sourced'):
+    for distro in ('jazzy', 'kilted'):
+        assert ros_is_sourced({'ROS_DISTRO': distro})
+        assert ros_is_sourced({'ROS_DISTRO': distro, 'JA_ROS_DISTRO': distro})
+    with pytest.raises(BootstrapError, match=r'ROS 2 humble is sourced .* jazzy or kilted: open'):
         ros_is_sourced({'ROS_DISTRO': 'humble'})
+
+
+def test_what_is_sourced_must_be_what_is_wanted():
+    with pytest.raises(BootstrapError, match='kilted is sourced here, but JA_ROS_DISTRO is jazzy'):
+        ros_is_sourced({'ROS_DISTRO': 'kilted', 'JA_ROS_DISTRO': 'jazzy'})
+
+
+def test_the_wheels_are_those_wanted_or_installed_or_of_jazzy():
+    assert distro_of_wheels(None) == 'jazzy'
+    assert distro_of_wheels('', 'kilted') == 'kilted'
+    assert distro_of_wheels('jazzy', 'kilted') == 'jazzy'
+    with pytest.raises(BootstrapError, match='JA_ROS_DISTRO=humble: this system runs on jazzy or'):
+        distro_of_wheels('humble')
 
 
 STEPS = [Step('environment', 'e1'), Step('base.lock', 'b1'), Step('packages', 'p1')]

@@ -56,7 +56,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         for file in ('setup.py', 'setup.cfg', 'package.xml'):
             (package / file).touch()
     (tmp_path / 'requirements').mkdir()
-    for name in ('ros', 'base', 'torch', 'dev', 'docs', *PARTS):
+    for name in ('ros', 'ros-kilted', 'base', 'torch', 'dev', 'docs', *PARTS):
         (tmp_path / 'requirements' / f'{name}.lock').write_text(name)
     monkeypatch.setattr(machine, 'missing_system_packages', lambda python, renders: [])
     monkeypatch.setattr(
@@ -196,6 +196,29 @@ def test_where_ros_is_sourced_no_ros_wheel_is_installed(checkout):
         *PART_LOCKS,
         '-e ',
     ]
+
+
+def test_the_wheels_of_another_distribution_are_chosen_and_remembered(checkout):
+    Recorded(checkout).prepare()
+    environment = Recorded(checkout, {'JA_ROS_DISTRO': 'kilted'})
+    environment.prepare()
+    assert environment.did()[:3] == ['-m venv', 'ros-kilted.lock', 'base.lock']
+    environment = Recorded(checkout)
+    environment.prepare()
+    assert environment.did() == []
+    environment = Recorded(checkout, {'JA_ROS_DISTRO': 'jazzy'})
+    environment.prepare()
+    assert environment.did()[:3] == ['-m venv', 'ros.lock', 'base.lock']
+
+
+def test_an_interrupted_setup_goes_on_with_the_same_distribution(checkout):
+    environment = Recorded(checkout, {'JA_ROS_DISTRO': 'kilted'})
+    environment.fail_at = 'base.lock'
+    with pytest.raises(KeyboardInterrupt):
+        environment.prepare()
+    environment = Recorded(checkout)
+    environment.prepare()
+    assert environment.did()[0] == 'base.lock'
 
 
 EGL = SystemPackage('libegl1', 'to render the simulated world without a display')

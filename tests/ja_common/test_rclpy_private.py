@@ -19,6 +19,7 @@ from rclpy.subscription import Subscription
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
+from ja_common.private_context import private_context
 from ja_common.rclpy_private import (
     ENTITY_KINDS,
     RCLError,
@@ -26,6 +27,7 @@ from ja_common.rclpy_private import (
     UnknownROSArgsError,
     UnspunSubscription,
     WaitSet,
+    keep_from_context,
     parameter_names,
     parameter_overrides,
     take_message,
@@ -76,6 +78,22 @@ def test_what_a_node_was_given_is_known_with_its_value(ros_context):
     node.declare_parameter('a', 5)
     assert parameter_overrides(node) == {'a': 1, 'not declared': 'b'}
     node.destroy_node()
+
+
+def test_a_context_does_not_destroy_a_node_that_is_kept_from_it():
+    destroyed = []
+
+    class Kept(Node):
+        def destroy_node(self) -> None:
+            destroyed.append(self)
+            super().destroy_node()
+
+    with private_context() as context:
+        node = Kept('node', context=context)
+        keep_from_context(node)
+    assert destroyed == []
+    node.destroy_node()
+    assert destroyed == [node]
 
 
 def test_step_of_a_spin_has_the_signature_that_we_overwrite():

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from ja_common.ros_defaults import PROFILE_VARIABLE
 from ja_diagnostics.faults import hosts
 from ros_testing import PATIENCE_S
 
@@ -39,7 +40,7 @@ with hosts.far_host() as host, private_executor() as executor:
 
 def run_near(for_s: float, **environ: str) -> tuple[dict[str, list[str]], int]:
     """Return what the intruder found on a host with this environment, and how often it called."""
-    names = ('ROS_LOCALHOST_ONLY', 'ROS_STATIC_PEERS', 'FASTRTPS_DEFAULT_PROFILES_FILE')
+    names = ('ROS_LOCALHOST_ONLY', 'ROS_STATIC_PEERS', PROFILE_VARIABLE)
     inherited = {name: value for name, value in os.environ.items() if name not in names}
     command = ['unshare', '--net', '--mount', sys.executable, '-c', NEAR, str(for_s)]
     ran = subprocess.run(

@@ -15,6 +15,7 @@ from std_msgs.msg import Float32
 
 from foreign_bags import FLOAT, RATES, write_db3, write_mcap
 from ja_common.core.config import ConfigError
+from ja_common.ros_defaults import ros_distro
 from ja_common.time_codec import to_ns, to_time
 from ja_common.topics import (
     CLOCK,
@@ -174,7 +175,7 @@ def test_a_type_that_is_not_installed_blocks_no_other(write, make_bench, tmp_pat
     assert bench.node.played == len(RATES)
     said = logged(capfd)
     assert said.count('/lidar is left out') == 1
-    assert 'ros-jazzy-velodyne-msgs' in said
+    assert f'ros-{ros_distro()}-velodyne-msgs' in said
     assert '--without /lidar' in said
     assert '/set/_service_event is left out' in said
 

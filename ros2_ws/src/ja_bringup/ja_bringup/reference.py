@@ -44,6 +44,7 @@ NODES = (
 COMPANIONS = (
     NodeSpec('ja_dashboard', 'view'),
     NodeSpec('ja_dashboard', 'markers'),
+    NodeSpec('ja_control', 'head_frames'),
     NodeSpec('ja_recording', 'recorder'),
     NodeSpec('ja_recording', 'player'),
 )

@@ -23,7 +23,7 @@ from ja_common.core.parameter_sections import parameter_sections
 from ja_common.core.unread_parameters import unread_parameters
 from ja_common.discovery_refresher import DiscoveryRefresher
 from ja_common.parameters import declare_config
-from ja_common.rclpy_private import parameter_names, parameter_overrides
+from ja_common.rclpy_private import keep_from_context, parameter_names, parameter_overrides
 from ja_common.silence import why_silent
 from ja_common.stamp_watch import watch_stamps
 from ja_common.topics import CLOCK, DIAGNOSTICS, Topic
@@ -50,6 +50,7 @@ class GraphNode(Node):
 
     def __init__(self, name: str, **node_kwargs: Any) -> None:
         super().__init__(name, **node_kwargs)
+        keep_from_context(self)
         self.health = Health(time.monotonic())
         # By resolved name; `./ja reference` makes the tables of docs/ from these.
         self.subscribed_topics: dict[str, Topic] = {}

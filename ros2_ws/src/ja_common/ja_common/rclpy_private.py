@@ -37,6 +37,17 @@ def parameter_overrides(node: Node) -> dict[str, Any]:
     return {name: given.value for name, given in node._parameter_overrides.items()}
 
 
+def keep_from_context(node: Node) -> None:
+    """Leave the end of a node to its owner, as rclpy 7 does.
+
+    A context of rclpy 9 destroys the nodes that it knows when it is shut down: those whose
+    constructor has failed as well, and others before their owner has ended them.
+    """
+    untrack = getattr(node.context, 'untrack_node', None)
+    if untrack is not None:
+        untrack(node)
+
+
 class StepExecutor(SingleThreadedExecutor):
     """rclpy's executor without its waiting: a subclass waits and serves in `spin_step`."""
 

@@ -3,17 +3,40 @@
 import ctypes
 import os
 from collections.abc import Mapping, MutableMapping
+from importlib import metadata
 from importlib.resources import files
 
+# rclpy 7 of ROS 2 Jazzy runs on Fast DDS 2, and rclpy 9 of Kilted on Fast DDS 3.
+_FIRST_WITH_FAST_DDS_3 = 9
+
+
+def has_fast_dds_3() -> bool:
+    """Return whether the rclpy that Python finds belongs to a ROS with Fast DDS 3."""
+    try:
+        return int(metadata.version('rclpy').partition('.')[0]) >= _FIRST_WITH_FAST_DDS_3
+    except (metadata.PackageNotFoundError, ValueError):
+        return False
+
+
+def ros_distro() -> str:
+    """Return the name of the ROS distribution that is sourced, or whose wheels are installed."""
+    return os.environ.get('ROS_DISTRO') or ('kilted' if has_fast_dds_3() else 'jazzy')
+
+
+PROFILE_VARIABLE = f'FAST{"DDS" if has_fast_dds_3() else "RTPS"}_DEFAULT_PROFILES_FILE'
+"""The environment variable from which the installed Fast DDS reads the file of its profile."""
+
 LOCALHOST_PROFILE = files('ja_common') / 'fastdds_localhost.xml'
-NETWORK_PROFILE = files('ja_common') / 'fastdds_network.xml'
+# Some elements have other names in Fast DDS 3; it refuses a file with one of the old names.
+NETWORK_PROFILE = files('ja_common') / (
+    'fastdds3_network.xml' if has_fast_dds_3() else 'fastdds_network.xml'
+)
 LEASE_S = 2.0
 """In both profiles: after this silence [s] other nodes take a node for dead."""
 
-_PROFILE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 ENVIRONMENT = {
     'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-    _PROFILE: str(LOCALHOST_PROFILE),
+    PROFILE_VARIABLE: str(LOCALHOST_PROFILE),
     'MALLOC_MMAP_THRESHOLD_': str(32 * 2**20),
     'MALLOC_TRIM_THRESHOLD_': str(512 * 2**20),
     'MALLOC_TOP_PAD_': str(64 * 2**20),
@@ -36,9 +59,9 @@ def apply_ros_defaults(environ: MutableMapping[str, str] = os.environ) -> None:
     for name, value in ENVIRONMENT.items():
         if not environ.get(name):
             environ[name] = value
-    if environ[_PROFILE] in _OUR_PROFILES:
+    if environ[PROFILE_VARIABLE] in _OUR_PROFILES:
         wide = reaches_network(environ)
-        environ[_PROFILE] = str(NETWORK_PROFILE if wide else LOCALHOST_PROFILE)
+        environ[PROFILE_VARIABLE] = str(NETWORK_PROFILE if wide else LOCALHOST_PROFILE)
     _tune_malloc(environ)
 
 

@@ -18,6 +18,7 @@ from ja_common.core.config import ConfigError
 from ja_common.middleware import TESTED, load_middleware
 from ja_common.python_command import code_command, module_command
 from ja_common.ros_arguments import SAFE_DOMAIN_ID, domain_id
+from ja_common.ros_defaults import PROFILE_VARIABLE
 from ja_runner.image_transport import (
     ENOUGH_SHARED_MB,
     SHARED_MEMORY,
@@ -171,7 +172,7 @@ def check_discovery() -> Finding:
         found_s = json.loads(publisher.communicate(timeout=60)[0])['discovery_s']
         delays_ms = json.loads(receiver.communicate(timeout=60)[0])['delays_ms']
     except (ValueError, KeyError, subprocess.TimeoutExpired):
-        fix = 'unset FASTRTPS_DEFAULT_PROFILES_FILE and ROS_AUTOMATIC_DISCOVERY_RANGE'
+        fix = f'unset {PROFILE_VARIABLE} and ROS_AUTOMATIC_DISCOVERY_RANGE'
         return Finding('discovery', False, 'two processes did not find each other', fix)
     finally:
         for process in (receiver, publisher):

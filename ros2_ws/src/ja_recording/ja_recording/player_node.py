@@ -15,6 +15,7 @@ from ja_common.graph_node import GraphNode
 from ja_common.message_types import message_class
 from ja_common.node_main import spin_node
 from ja_common.qos_text import common_profile, profile_of
+from ja_common.ros_defaults import ros_distro
 from ja_common.time_codec import to_time
 from ja_common.topics import CLOCK, Topic
 from ja_recording.core.reader import RecordedMessage, RecordedTopic, Recording
@@ -98,7 +99,9 @@ class PlayerNode(GraphNode):
             text = f'{topic.name} is left out: {error}'
             if '/msg/' in topic.type_name:
                 package = topic.type_name.partition('/')[0].replace('_', '-')
-                text += f'. Install ros-jazzy-{package}, or source the workspace that has it'
+                text += (
+                    f'. Install ros-{ros_distro()}-{package}, or source the workspace that has it'
+                )
             self.get_logger().warning(f'{text}; `--without {topic.name}` leaves it out unasked')
             return
         qos = self._profile(topic)

@@ -12,6 +12,7 @@ from mcap.writer import CompressionType, Writer
 from ja_common.core.config import ConfigError
 from ja_common.core.safe_files import parse_yaml
 from ja_common.message_types import schema_of
+from ja_common.ros_defaults import ros_distro
 
 _MB = 10**6
 _CHUNK_BYTES = 1 << 20
@@ -187,7 +188,7 @@ class RecordingFolder:
                 'relative_file_paths': [file.path.name for file in files],
                 'files': [file.metadata_entry() for file in files],
                 'custom_data': dict(self.custom_data) or None,
-                'ros_distro': 'jazzy',
+                'ros_distro': ros_distro(),
             }
         }
 

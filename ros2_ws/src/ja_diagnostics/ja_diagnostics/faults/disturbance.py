@@ -34,6 +34,11 @@ class Disturbance:
         while self._waiting and self._waiting[0][0] <= now_s:
             yield heapq.heappop(self._waiting)[-1]
 
+    @property
+    def next_due_s(self) -> float | None:
+        """Return when the next message goes out [s]; None while none waits."""
+        return self._waiting[0][0] if self._waiting else None
+
     def _schedule(self, message: Any, now_s: float) -> None:
         self._count += 1  # messages that are due together keep their order
         heapq.heappush(self._waiting, (now_s + self.delay_s, self._count, message))

@@ -19,12 +19,13 @@ from pathlib import Path
 from ja_common.python_command import code_command, module_command
 from ja_common.ros_defaults import apply_ros_defaults
 from ja_diagnostics.faults import intruder
+from ja_diagnostics.faults.cable import FAR, NEAR
 from ja_diagnostics.faults.catalogue import Fault, Graph
 from ja_diagnostics.faults.run import FaultOutcome, FaultRun
 from ja_runner.node_spec import NodeSpec
 
 _RESULT = 'outcome.json'
-_NEAR, _FAR = '10.77.0.1/24', '10.77.0.2/24'
+_NEAR_ADDRESS, _FAR_ADDRESS = '10.77.0.1/24', '10.77.0.2/24'
 _FULL_BYTES = 40 * 2**20
 _SEGMENT_BYTES = 8 * 2**20
 _INTRUDER_S = 5.0
@@ -103,7 +104,7 @@ def place_on_host(graph: Sequence[NodeSpec], executable: str, host: int) -> list
 def _network_cut(folder: Path) -> FaultOutcome:
     with far_host() as host:
         # This is safe: no link leads out of these two hosts.
-        _set_discovery_range('SUBNET')
+        set_discovery_range('SUBNET')
 
         def place(graph: list[NodeSpec]) -> list[NodeSpec]:
             return place_on_host(graph, 'learning_module', host)
@@ -119,7 +120,7 @@ def _network_cut(folder: Path) -> FaultOutcome:
 
 def _intruder(folder: Path) -> FaultOutcome:
     with far_host() as host:
-        _set_discovery_range('LOCALHOST')
+        set_discovery_range('LOCALHOST')
         tries: list[subprocess.Popen[str]] = []
 
         def end(_: Graph) -> None:
@@ -156,15 +157,15 @@ def start_intruder(host: int, for_s: float = _INTRUDER_S) -> subprocess.Popen[st
     environ = {
         **os.environ,
         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET',
-        'ROS_STATIC_PEERS': _NEAR.partition('/')[0],
+        'ROS_STATIC_PEERS': _NEAR_ADDRESS.partition('/')[0],
     }
     program = module_command(intruder.__name__, str(for_s))
     command = ['nsenter', f'--target={host}', '--net', '--mount', '--', *program]
     return subprocess.Popen(command, env=environ, stdout=subprocess.PIPE, text=True)
 
 
-def _set_discovery_range(name: str) -> None:
-    """Set the range of this process and its children, whatever the caller has set."""
+def set_discovery_range(name: str) -> None:
+    """Set the discovery range of this process and its children, whatever the caller has set."""
     for other in ('ROS_LOCALHOST_ONLY', 'ROS_STATIC_PEERS'):
         os.environ.pop(other, None)
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = name
@@ -177,8 +178,12 @@ def _run_fault(run: FaultRun, fault: Fault) -> FaultOutcome:
 
 
 @contextmanager
-def far_host() -> Iterator[int]:
-    """Make a second host at the end of a virtual cable; yield the process id of its namespaces."""
+def far_host(connect: Callable[[int], None] | None = None) -> Iterator[int]:
+    """Make a second host at the end of a virtual cable; yield the process id of its namespaces.
+
+    `connect` is called with that id, and puts the device `far` there, and `near` here; by default
+    they are a pair that neither delays nor loses anything.
+    """
     # It waits for the end of its input, so that it ends with this process.
     script = 'mount -t tmpfs tmpfs /dev/shm && ip link set lo up && echo ready && cat'
     far = subprocess.Popen(
@@ -188,11 +193,11 @@ def far_host() -> Iterator[int]:
     assert far.stdout is not None
     try:
         far.stdout.readline()
-        _ip(f'link add near type veth peer name far netns {far.pid}')
-        _ip(f'address add {_NEAR} dev near')
+        (connect or _make_pair)(far.pid)
+        _ip(f'address add {_NEAR_ADDRESS} dev near')
         _ip('link set near up')
         enter = ['nsenter', f'--target={far.pid}', '--net']
-        for order in (f'address add {_FAR} dev far', 'link set far up'):
+        for order in (f'address add {_FAR_ADDRESS} dev far', 'link set far up'):
             subprocess.run([*enter, 'ip', *order.split()], check=True)
         # Fast DDS looks once for interfaces, and takes only those whose cable is plugged in.
         _wait_until_plugged_in('near')
@@ -202,13 +207,23 @@ def far_host() -> Iterator[int]:
         far.communicate()
 
 
+def move_far_end(host: int) -> None:
+    """Move the end `far` of a cable (`cable.lay_cable`) to a host."""
+    _ip(f'link set {FAR} netns {host}')
+
+
+def _make_pair(host: int) -> None:
+    _ip(f'link add {NEAR} type veth peer name {FAR} netns {host}')
+
+
 def _wait_until_plugged_in(device: str, enter: Sequence[str] = ()) -> None:
     command = [*enter, 'ip', '-oneline', 'link', 'show', device]
     end_s = time.monotonic() + _PLUG_PATIENCE_S
-    while (
-        ' state UP '
-        not in subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    ):
+    while True:
+        shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        # A TAP device does not know its state; its carrier is there once its program runs.
+        if 'LOWER_UP' in shown and (' state UP ' in shown or ' state UNKNOWN ' in shown):
+            return
         if time.monotonic() > end_s:
             raise OSError(f'the virtual network device {device} did not come up')
         time.sleep(0.02)
