@@ -217,14 +217,14 @@ def test_clock_set_forward_is_no_leap_of_the_head(make_graph):
 def test_disabled_gate_holds_and_starts_from_where_the_head_stands(graph):
     graph.image()
     graph.image()
-    assert graph.bench.call(SetBool, 'enable', data=False).success
+    assert graph.bench.call(SetBool, 'gate/enable', data=False).success
     held = graph.image()
     for sag in (0.0, 0.02, -0.05):
         graph.pan = held.position[0] + sag
         assert graph.image(follow=False).position == held.position
     assert graph.status()[1]['reason'] == 'disabled'
     graph.pan = 0.2
-    graph.bench.call(SetBool, 'enable', data=True)
+    graph.bench.call(SetBool, 'gate/enable', data=True)
     assert graph.image().position[0] == pytest.approx(0.2)
     assert graph.image().position[0] == pytest.approx(0.0)
 
@@ -239,7 +239,7 @@ def test_gate_may_start_disabled(make_graph):
 def test_home_turns_to_the_home_posture_and_looks_from_there(make_graph):
     graph = make_graph(home_pan_rad=0.3, home_tilt_rad=0.0)
     graph.image()
-    assert graph.bench.call(Trigger, 'home').success
+    assert graph.bench.call(Trigger, 'gate/home').success
     assert graph.image().position[0] == pytest.approx(0.2)
     assert graph.status()[1]['phase'] == 'home'
     for _ in range(5):
@@ -250,9 +250,9 @@ def test_home_turns_to_the_home_posture_and_looks_from_there(make_graph):
 
 def test_home_is_refused_while_disabled(make_graph):
     graph = make_graph(enabled_at_start=False)
-    response = graph.bench.call(Trigger, 'home')
+    response = graph.bench.call(Trigger, 'gate/home')
     assert not response.success
-    assert response.message == 'the gate is disabled: call enable first'
+    assert response.message == 'the gate is disabled: call gate/enable first'
 
 
 def test_command_stays_inside_the_position_limits(make_graph):

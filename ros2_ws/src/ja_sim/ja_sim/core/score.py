@@ -47,6 +47,7 @@ class Score:
     def __init__(self, window: int = 100) -> None:
         self._truth: TruthAt | None = None
         self._is_whole = False  # the present trial was observed from its beginning
+        self._began_ns = -1
         self._fixated: tuple[float, float] | None = None
         self._success = False
         self._recent: deque[bool] = deque(maxlen=window)
@@ -66,12 +67,22 @@ class Score:
             if self._is_whole and truth.trial > self._truth.trial:
                 ended = self._close(self._truth)
             self._is_whole, self._fixated, self._success = truth.trial > 0, None, False
+            self._began_ns = truth.stamp_ns
         self._truth = truth
         if fixation is not None and self._fixated is None:
             nearest = int(np.argmin(angle_between(truth.directions, fixation)))
             self._fixated = (float(fixation[0]), float(fixation[1]))
             self._success = nearest == truth.attended
         return ended
+
+    def interrupt_trial(self, stamp_ns: int) -> None:
+        """Do not count the present trial if it began at this stamp [ns] or before.
+
+        From that image on the head did not do what a trial asks for. A trial with a fixation is
+        over for the robot, and counts.
+        """
+        if self._began_ns <= stamp_ns and self._fixated is None:
+            self._is_whole = False
 
     def rates(self) -> dict[str, Rate]:
         """Return rates by name: 'all', 'recent', 'in_view', 'out_of_view', and 'objects_N'."""
