@@ -112,3 +112,14 @@ def test_nothing_is_known_before_the_first_trial():
     assert math.isnan(Rate(0, 0).rate)
     assert Rate(0, 0).interval == (0.0, 1.0)
     assert Rate(0, 50).interval[0] == pytest.approx(0.0)
+
+
+def test_an_interrupted_trial_does_not_count(score):
+    play(score, 1, [None, None], stamp_s=7)
+    score.interrupt_trial(7 * S)
+    assert play(score, 2, [LEFT], stamp_s=8) is None
+    score.interrupt_trial(9 * S)
+    assert play(score, 3, [None], stamp_s=9).success, 'a fixation had ended it'
+    score.interrupt_trial(8 * S)
+    assert play(score, 4, [None], stamp_s=10) is not None, 'of the trial before'
+    assert score.rates()['all'].trials == 2

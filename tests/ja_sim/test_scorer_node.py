@@ -8,7 +8,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from ja_common.point_cloud_codec import encode_columns
-from ja_common.topics import FIXATION, SCORE, SIM_TRUTH, SUCCESS_RATE
+from ja_common.topics import FIXATION, INTERRUPTED, SCORE, SIM_TRUTH, SUCCESS_RATE
 from ja_sim.scorer_node import ScorerNode
 from ja_sim.truth_codec import FIELDS
 from node_bench import header, joint_state
