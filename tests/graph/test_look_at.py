@@ -91,9 +91,7 @@ def test_the_head_looks_where_another_node_points_and_learns_nothing_from_it():
                 if spec.executable == 'learning_module':
                     make = partial(make, on_update=lambda trial, stamp_ns: learned.append(trial))
                 arguments = spec.ros_arguments()
-                nodes.append(
-                    make(context=context, cli_args=arguments, use_global_arguments=False)
-                )
+                nodes.append(make(context=context, cli_args=arguments, use_global_arguments=False))
             pointer = Pointer(context)
             nodes.append(pointer)
             for node in nodes:

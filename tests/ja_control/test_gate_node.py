@@ -787,7 +787,7 @@ def test_a_stamp_of_zero_is_now(graph):
 @pytest.mark.parametrize(
     ('point', 'frame', 'late_s', 'reason'),
     [
-        ((1.0, 0.0, 0.0), 'map', 0.0, "the frame 'map' is not known: give the point in 'base_link'"),
+        ((1.0, 0.0, 0.0), 'map', 0.0, "'map' is not known: give the point in 'base_link'"),
         ((1.0, 0.0, 0.0), '', 0.0, "the frame '' is not known"),
         ((math.nan, 0.0, 0.0), 'base_link', 0.0, 'the point is not finite'),
         ((0.0, 0.0, 0.0), 'camera_optical_frame', 0.0, 'it has no direction'),
@@ -927,7 +927,7 @@ def test_old_names_of_services_work_with_one_warning(graph, capfd, kind, name, r
     assert 'was called' not in capfd.readouterr().err
     for _ in range(2):
         assert graph.bench.call(kind, name, **request_).success
-    text = f'the service /{name} was called, which the next release will not have: call /gate/{name}'
+    text = f'/{name} was called, which the next release will not have: call /gate/{name}'
     assert capfd.readouterr().err.count(text) == 1
 
 
