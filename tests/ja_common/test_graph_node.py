@@ -270,6 +270,7 @@ def test_main_refuses_bad_arguments_in_one_line(domain, capfd, args, text):
 class FixedConfig(Configuration):
     rate_hz: float = parameter(2.0, 'rate', low=1.0, high=9.0)
     scene: str = parameter('table', 'scene')
+    camera: str = parameter('off', 'second camera', choices=('on', 'off'))
 
 
 @dataclass(frozen=True)
@@ -335,6 +336,8 @@ def test_a_dump_of_the_parameters_is_loaded_without_an_error(make_bench, tmp_pat
         ({'rate_hz': 2.5, 'scene': 'table'}, 'rate_hz'),
         ({'rate_hz': True}, 'rate_hz'),
         ({'rate_hz': '2.0'}, 'rate_hz'),
+        ({'camera': True}, 'camera'),
+        ({'scene': False}, 'scene'),
     ],
 )
 def test_another_value_of_a_read_only_parameter_is_refused(make_bench, values, refused):

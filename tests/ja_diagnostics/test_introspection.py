@@ -40,7 +40,7 @@ def dumped(client: AsyncParameterClient, ask: Ask) -> dict[str, Any]:
 
 
 def test_parameters_survive_dump_and_load(domain: int, tmp_path: Path) -> None:
-    """By `ros2 param load`, which refuses nothing that is unchanged, and as the file of a new node."""
+    """By `ros2 param load`, which refuses nothing, and as the file of a new node."""
     path = tmp_path / 'dump.yaml'
     with every_node(ALL) as nodes:
         tool = rclpy.create_node('tool', context=nodes[0].context)

@@ -226,9 +226,14 @@ class GraphNode(Node):
         if not self.describe_parameter(parameter.name).read_only:
             return False
         known = self.get_parameter(parameter.name)
+        value = known.value
+        if known.type_ is Parameter.Type.STRING and parameter.type_ is Parameter.Type.BOOL:
+            # rclpy's reader of parameter files takes the quotes off: 'off' arrives as False.
+            value = {'on': True, 'yes': True, 'off': False, 'no': False}.get(value)
+            return bool(value is parameter.value)
         whole = (Parameter.Type.INTEGER, Parameter.Type.DOUBLE)  # `1` for a float that is 1.0
         kinds = (parameter.type_, known.type_)
-        return (kinds[0] == kinds[1] or kinds == whole) and parameter.value == known.value
+        return (kinds[0] == kinds[1] or kinds == whole) and bool(parameter.value == value)
 
     def namespaced_folder(self, folder: str | Path) -> Path:
         """Return the subfolder for the files of this node's namespace: one for each head."""
