@@ -16,7 +16,7 @@ FACE = Detection(Kind.FACE, 0.0, 0.0, 160.0, 120.0, 60.0, 80.0, 0.9)
 CAMERA = CameraModel.from_field_of_view(320, 240, 0.6)
 # All of a picture but its stamp.
 PICTURE = (np.full((240, 320, 3), 60, np.uint8), [FACE], None, CAMERA, 0.004)
-SERVICES = frozenset({'enable', 'home', 'reset_learning', 'sim/pause', 'sim/step'})
+SERVICES = frozenset({'gate/enable', 'gate/home', 'reset_learning', 'sim/pause', 'sim/step'})
 
 
 class FakeModel:
@@ -36,7 +36,7 @@ class FakeModel:
                 'settings': {'objects': 3, 'learner': 'paper'},
                 'choices': {'learner': ('paper', 'gaze_line')},
                 'services': SERVICES,
-                'switches': {'enable': True, 'sim/pause': False},
+                'switches': {'gate/enable': True, 'sim/pause': False},
                 **changes,
             }
         )

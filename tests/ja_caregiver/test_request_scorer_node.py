@@ -52,7 +52,7 @@ class Robot:
         self.stamp_ns, self.trials, self.things = 10**9, 0, dict(THINGS)
         self.person, self.passer, self.enabled = True, False, True
         self.enabled_calls = []
-        bench.peer.create_service(SetBool, 'enable', self._on_enable)
+        bench.peer.create_service(SetBool, 'gate/enable', self._on_enable)
         bench.publish(TRACK, String(data='strict'))
         bench.publish(CAMERA_INFO, encode_camera_info(header(1), WIDTH, HEIGHT, FOCAL))
         bench.wait(lambda: bench.received(TRACK) and bench.received(CAMERA_INFO))

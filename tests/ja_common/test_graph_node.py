@@ -3,9 +3,13 @@
 import os
 import signal
 from dataclasses import dataclass
+from functools import partial
 
 import pytest
 import rclpy
+import yaml
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
@@ -13,7 +17,8 @@ from ja_common.core.config import Configuration, parameter
 from ja_common.core.health import Level
 from ja_common.graph_node import GraphNode
 from ja_common.node_main import spin_node
-from ja_common.topics import DIAGNOSTICS, FIXATION, IMAGE, JOINT_STATES
+from ja_common.renamed_publisher import RenamedPublisher
+from ja_common.topics import DIAGNOSTICS, FIXATION, IMAGE, JOINT_STATES, OLD_TARGET, TARGET
 from node_bench import joint_state
 
 
@@ -259,3 +264,138 @@ def test_main_refuses_bad_arguments_in_one_line(domain, capfd, args, text):
     assert error.startswith('error: ')
     assert text in error
     assert not rclpy.ok()
+
+
+@dataclass(frozen=True)
+class FixedConfig(Configuration):
+    rate_hz: float = parameter(2.0, 'rate', low=1.0, high=9.0)
+    scene: str = parameter('table', 'scene')
+    camera: str = parameter('off', 'second camera', choices=('on', 'off'))
+
+
+@dataclass(frozen=True)
+class FreeConfig(Configuration):
+    gain: float = parameter(0.5, 'gain', low=0.0, high=1.0)
+
+
+class Tuned(GraphNode):
+    """Has read-only parameters, and one that may be set."""
+
+    def __init__(self, **node_kwargs):
+        super().__init__('tuned', **node_kwargs)
+        self.configure(FixedConfig)
+        self.configure(FreeConfig, lambda config: None)
+
+
+class ParameterClient:
+    """Calls the services of parameters as `ros2 param dump` and `ros2 param load` do."""
+
+    def __init__(self, bench):
+        self._bench = bench
+        self._client = AsyncParameterClient(bench.peer, bench.node.get_fully_qualified_name())
+        bench.wait(self._client.services_are_ready)
+
+    def dump(self):
+        names = self._answer(self._client.list_parameters()).result.names
+        values = self._answer(self._client.get_parameters(names)).values
+        return dict(zip(names, values, strict=True))
+
+    def load_file(self, path):
+        return self._answer(self._client.load_parameter_file(str(path))).results
+
+    def set_atomically(self, **values):
+        parameters = [Parameter(name, value=value) for name, value in values.items()]
+        return self._answer(self._client.set_parameters_atomically(parameters)).result
+
+    def _answer(self, future):
+        self._bench.wait(future.done)
+        return future.result()
+
+
+def test_a_dump_of_the_parameters_is_loaded_without_an_error(make_bench, tmp_path):
+    """Of read-only parameters too: of ours, and of those that rclpy gives to every node."""
+    bench = make_bench(Tuned)
+    client = ParameterClient(bench)
+    dumped = {name: parameter_value_to_python(value) for name, value in client.dump().items()}
+    assert {'rate_hz', 'scene', 'gain', 'use_sim_time'} <= dumped.keys()
+    dumped |= {'rate_hz': 2, 'gain': 0.75}  # YAML of another tool may write 2 for 2.0
+    path = tmp_path / 'tuned.yaml'
+    path.write_text(yaml.safe_dump({'/tuned': {'ros__parameters': dumped}}))
+    results = client.load_file(path)
+    assert len(results) == len(dumped)
+    assert [result.reason for result in results if not result.successful] == []
+    assert bench.node.get_parameter('gain').value == 0.75
+    assert bench.node.get_parameter('rate_hz').type_ is Parameter.Type.DOUBLE
+
+
+@pytest.mark.parametrize(
+    ('values', 'refused'),
+    [
+        ({'scene': 'shelf'}, 'scene'),
+        ({'scene': 'shelf', 'gain': 0.9}, 'scene'),
+        ({'rate_hz': 2.5, 'scene': 'table'}, 'rate_hz'),
+        ({'rate_hz': True}, 'rate_hz'),
+        ({'rate_hz': '2.0'}, 'rate_hz'),
+        ({'camera': True}, 'camera'),
+        ({'scene': False}, 'scene'),
+    ],
+)
+def test_another_value_of_a_read_only_parameter_is_refused(make_bench, values, refused):
+    bench = make_bench(Tuned)
+    result = ParameterClient(bench).set_atomically(**values)
+    assert not result.successful
+    assert result.reason == f'Trying to set a read-only parameter: {refused}.'
+    assert bench.node.get_parameter('gain').value == 0.5, 'all or nothing'
+
+
+class Renamed(GraphNode):
+    """Offers a service and publishes a topic, each under its old name as well."""
+
+    def __init__(self, **node_kwargs):
+        super().__init__('renamed', **node_kwargs)
+        self.calls = 0
+        self.publisher = RenamedPublisher(self, TARGET, OLD_TARGET)
+        self.advertise_renamed_service(Trigger, 'renamed/do', 'do', self._on_do)
+
+    def _on_do(self, _, response):
+        self.calls += 1
+        response.success = True
+        return response
+
+
+def test_an_old_name_of_a_service_works_with_one_warning(make_bench, capfd):
+    bench = make_bench(partial(Renamed, namespace='left'))
+    assert bench.call(Trigger, 'left/renamed/do').success
+    assert capfd.readouterr().err == ''
+    for _ in range(2):
+        assert bench.call(Trigger, 'left/do').success
+    assert bench.node.calls == 3
+    text = 'the service /left/do was called, which the next release will not have: call '
+    assert capfd.readouterr().err.count(f'{text}/left/renamed/do') == 1
+
+
+def test_an_old_name_of_a_topic_works_with_one_warning(make_bench, capfd):
+    bench = make_bench(Renamed)
+    publisher, heard = bench.node.publisher, []
+    assert not publisher.is_subscribed
+    publisher.publish(TARGET.type())
+
+    def listen(topic):
+        bench.peer.create_subscription(topic.type, topic.name, lambda _: heard.append(topic), 10)
+
+    def publish_until(count):
+        def another():
+            publisher.publish(TARGET.type())
+            return len(set(heard)) == count
+
+        bench.wait(another)
+
+    listen(TARGET)
+    bench.wait(lambda: publisher.is_subscribed)
+    publish_until(1)
+    assert 'subscribe' not in capfd.readouterr().err
+    listen(OLD_TARGET)
+    publish_until(2)
+    publish_until(2)
+    text = 'a node subscribes to /target, which the next release will not have: subscribe to '
+    assert capfd.readouterr().err.count(f'{text}/salient_feature_detector/target') == 1

@@ -7,7 +7,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ja_common.core.config import ConfigError, Configuration, parameter
-from ja_common.parameters import declare_config
+from ja_common.parameters import choices_of, declare_config
 
 
 @dataclass(frozen=True)
@@ -65,11 +65,16 @@ def test_a_float_stays_one_for_all_who_read_the_parameter(make_node):
 def test_parameters_describe_themselves(make_node):
     node = make_node()
     declare_config(node, Config)
-    assert node.describe_parameter('colour').description == 'which colour (one of red, green)'
+    colour = node.describe_parameter('colour')
+    assert colour.description == 'which colour (one of red, green) (read-only)'
+    assert colour.additional_constraints == 'one of: red, green'
+    assert choices_of(colour) == ('red', 'green')
+    assert choices_of(node.describe_parameter('low')) == ()
     (bounds,) = node.describe_parameter('low').floating_point_range
     assert (bounds.from_value, bounds.to_value) == (-1.0, 1.0)
     assert node.describe_parameter('count').integer_range[0].from_value == 1
     assert node.describe_parameter('low').read_only
+    assert node.describe_parameter('low').description == 'lower end (read-only)'
 
 
 @pytest.mark.parametrize(
@@ -140,3 +145,11 @@ def test_read_only_parameter_cannot_be_set(make_node):
     result = set_all(node, low=0.1)
     assert not result.successful
     assert 'read-only' in result.reason
+
+
+def test_a_parameter_that_may_be_set_is_not_called_read_only(make_node):
+    node = make_node()
+    declare_config(node, Config, lambda config: None)
+    colour = node.describe_parameter('colour')
+    assert colour.description == 'which colour (one of red, green)'
+    assert choices_of(colour) == ('red', 'green')

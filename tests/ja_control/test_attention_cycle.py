@@ -467,3 +467,64 @@ def test_time_without_a_person_counts_while_the_head_looks_or_searches():
     while cycle.phase is Phase.SEARCH:
         run(cycle, world, 1)
     assert cycle.unseen_s == 0.0
+
+
+def test_a_point_interrupts_the_trial_and_gives_the_head_back_to_the_caregiver():
+    world = AngleWorld(objects=[(0.25, 0.1)], face=(0.0, 0.0))
+    cycle = make_cycle(look_at_hold_s=1.0)
+    rounds = run(cycle, world, 40)
+    shift = first(rounds, Phase.SHIFT)
+    world = AngleWorld(objects=[(0.25, 0.1)], face=(0.0, 0.0))
+    cycle = make_cycle(look_at_hold_s=1.0)
+    run(cycle, world, shift + 1)
+    assert cycle.phase is Phase.SHIFT
+    cycle.look_at(np.array([-0.4, 0.2]))
+    assert cycle.is_interrupted
+    rounds = run(cycle, world, 11)
+    assert phases(rounds) == [Phase.LOOK_AT, Phase.LOOK]
+    looked = [p.posture.stamp_ns for p, d in rounds if d.phase is Phase.LOOK_AT]
+    assert (looked[-1] - looked[0]) * 1e-9 == pytest.approx(0.9)
+    assert rounds[8][0].posture.position == pytest.approx((-0.4, 0.2))
+    assert cycle.trials == 0, 'what it interrupts is no trial'
+    after = run(cycle, world, 30)
+    assert after[0][1].target == pytest.approx((0.0, 0.0)), 'back to where the face was'
+    assert cycle.trials > 0
+
+
+def test_each_new_point_counts_from_zero_and_is_followed():
+    world = AngleWorld(face=(0.0, 0.0))
+    cycle = make_cycle(look_at_hold_s=0.5)
+    run(cycle, world, 3)
+    for step in range(30):
+        cycle.look_at(np.array([0.02 * step, 0.0]))
+        (last,) = run(cycle, world, 1)
+        assert last[1].phase is Phase.LOOK_AT
+        assert last[1].target == pytest.approx((0.02 * step, 0.0))
+
+
+@pytest.mark.parametrize('seen', [True, False])
+def test_a_point_that_is_cleared_no_longer_moves_the_head(seen):
+    world = AngleWorld(face=(0.0, 0.0) if seen else None)
+    cycle = make_cycle()
+    run(cycle, world, 3)
+    assert not cycle.end_look_at()
+    cycle.look_at(np.array([0.8, 0.0]))
+    run(cycle, world, 2)
+    assert cycle.end_look_at()
+    stopped = world.position.copy()
+    rounds = run(cycle, world, 5)
+    assert {d.phase for _, d in rounds} == {Phase.LOOK}
+    assert world.position == pytest.approx((0.0, 0.0) if seen else stopped)
+
+
+@pytest.mark.parametrize('end', ['home', 'restart'])
+def test_home_and_a_hold_end_a_look_at_a_point(end):
+    world = AngleWorld(face=(0.0, 0.0))
+    cycle = make_cycle()
+    run(cycle, world, 3)
+    cycle.look_at(np.array([0.8, 0.0]))
+    run(cycle, world, 2)
+    cycle.go_home() if end == 'home' else cycle.restart()
+    assert cycle.phase is (Phase.HOME if end == 'home' else Phase.LOOK)
+    cycle.look_at(np.array([0.8, 0.0]))
+    assert cycle.phase is Phase.LOOK_AT, 'the newest request counts'

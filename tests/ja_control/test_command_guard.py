@@ -229,7 +229,7 @@ def test_latched_fault_waits_for_enable():
     rig.images = True
     held = rig.run(0.5, target=(0.5, 0.0))[-1]
     assert held.hold.cause is Cause.SILENT
-    assert 'latched until enable is called' in held.hold.text
+    assert 'latched until gate/enable is called' in held.hold.text
     rig.guard.enable(True)
     assert rig.run(0.5, target=(0.5, 0.0))[-1].position == pytest.approx((0.5, 0.0))
 

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 import rclpy
+from geometry_msgs.msg import Point, PointStamped
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -27,10 +28,12 @@ from ja_common.topics import (
     FORWARD_COMMANDS,
     GATE_STATUS,
     GLANCE_DELTA,
+    INTERRUPTED,
     JOINT_COMMANDS,
     JOINT_STATES,
     JOINT_TRAJECTORY,
     LM_DELTA,
+    LOOK_AT,
     ROBOT_DESCRIPTION,
     VF_DELTA,
 )
@@ -39,9 +42,14 @@ from node_bench import header, joint_state
 
 PERIOD_NS = 100_000_000
 PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, GLANCE_DELTA, FIXATION)
-PUBLISHES = (*PROPOSALS, EVIDENCE, JOINT_STATES, CLOCK)
+PUBLISHES = (*PROPOSALS, EVIDENCE, JOINT_STATES, CLOCK, LOOK_AT)
 FACE_RIGHT = {FACE_DELTA: (-0.5, 0.0)}
 SPEED = 2.0  # the gate's default [rad/s]
+
+
+def point_stamped(point, frame, stamp_ns):
+    x, y, z = point
+    return PointStamped(header=header(stamp_ns, frame), point=Point(x=x, y=y, z=z))
 
 
 class Graph:
@@ -91,6 +99,16 @@ class Graph:
 
         self.bench.wait(publish_and_read)
 
+    def look_at(self, *point, frame='base_link', stamp_ns=None):
+        """Publish a point to look at, and wait until the gate has it."""
+        stamp_ns = self.stamp_ns if stamp_ns is None else stamp_ns
+        before = self.bench.received(LOOK_AT)
+        self.bench.publish(LOOK_AT, point_stamped(point, frame, stamp_ns))
+        self.bench.wait(lambda: self.bench.received(LOOK_AT) > before)
+
+    def phase(self):
+        return self.status()[1]['phase']
+
     def status(self):
         """Return the status of the last command, and its values."""
         messages = self.bench.messages
@@ -105,7 +123,7 @@ def make_graph(make_bench):
         # An acceleration that reaches full speed in one period: plain numbers to compare with.
         plain = {'lockstep': True, 'max_acceleration_rad_s2': 1e4, 'dead_zone_rad': 0.0}
         parameters = {'use_sim_time': True, **plain, **parameters}
-        subscribes = [JOINT_COMMANDS, GATE_STATUS]
+        subscribes = [JOINT_COMMANDS, GATE_STATUS, INTERRUPTED]
         return Graph(make_bench(GateNode, PUBLISHES, subscribes, **parameters))
 
     return make
@@ -217,14 +235,14 @@ def test_clock_set_forward_is_no_leap_of_the_head(make_graph):
 def test_disabled_gate_holds_and_starts_from_where_the_head_stands(graph):
     graph.image()
     graph.image()
-    assert graph.bench.call(SetBool, 'enable', data=False).success
+    assert graph.bench.call(SetBool, 'gate/enable', data=False).success
     held = graph.image()
     for sag in (0.0, 0.02, -0.05):
         graph.pan = held.position[0] + sag
         assert graph.image(follow=False).position == held.position
     assert graph.status()[1]['reason'] == 'disabled'
     graph.pan = 0.2
-    graph.bench.call(SetBool, 'enable', data=True)
+    graph.bench.call(SetBool, 'gate/enable', data=True)
     assert graph.image().position[0] == pytest.approx(0.2)
     assert graph.image().position[0] == pytest.approx(0.0)
 
@@ -239,7 +257,7 @@ def test_gate_may_start_disabled(make_graph):
 def test_home_turns_to_the_home_posture_and_looks_from_there(make_graph):
     graph = make_graph(home_pan_rad=0.3, home_tilt_rad=0.0)
     graph.image()
-    assert graph.bench.call(Trigger, 'home').success
+    assert graph.bench.call(Trigger, 'gate/home').success
     assert graph.image().position[0] == pytest.approx(0.2)
     assert graph.status()[1]['phase'] == 'home'
     for _ in range(5):
@@ -250,9 +268,9 @@ def test_home_turns_to_the_home_posture_and_looks_from_there(make_graph):
 
 def test_home_is_refused_while_disabled(make_graph):
     graph = make_graph(enabled_at_start=False)
-    response = graph.bench.call(Trigger, 'home')
+    response = graph.bench.call(Trigger, 'gate/home')
     assert not response.success
-    assert response.message == 'the gate is disabled: call enable first'
+    assert response.message == 'the gate is disabled: call gate/enable first'
 
 
 def test_command_stays_inside_the_position_limits(make_graph):
@@ -497,7 +515,7 @@ class RealTime:
     """A gate on its own clock, and a head that follows; the test publishes the images."""
 
     def __init__(self, make_bench, **parameters):
-        publishes = [*PROPOSALS, EVIDENCE, JOINT_STATES]
+        publishes = [*PROPOSALS, EVIDENCE, JOINT_STATES, LOOK_AT]
         subscribes = [JOINT_COMMANDS, GATE_STATUS]
         parameters = {'control_rate_hz': RATE_HZ, **parameters}
         self.bench = make_bench(GateNode, publishes, subscribes, **parameters)
@@ -714,3 +732,233 @@ def test_nothing_holds_at_the_start_before_our_own_publisher_is_discovered(graph
     for _ in range(5):
         graph.image()
         assert 'reason' not in graph.status()[1]
+
+
+NOT_AHEAD = (2.0, 0.8, 0.0)  # [m]: to the left
+AHEAD_OF_IT = (math.atan2(0.8, 2.0), 0.0)
+
+
+def test_a_point_is_looked_at_for_its_time_and_then_the_caregiver_again(make_graph):
+    graph = make_graph(look_at_hold_s=0.55)
+    for _ in range(3):
+        graph.image({FACE_DELTA: (-graph.pan, 0.0)})
+    graph.look_at(*NOT_AHEAD)
+    commands, phases = [], []
+    for _ in range(9):
+        commands.append(graph.image({FACE_DELTA: (-graph.pan, 0.0)}))
+        phases.append(graph.phase())
+    assert phases == ['look_at'] * 6 + ['look'] * 3
+    assert commands[0].position[0] == pytest.approx(SPEED * PERIOD_NS / 1e9, abs=0.005), 'guarded'
+    assert list(commands[4].position) == pytest.approx(AHEAD_OF_IT, abs=1e-6)
+    assert commands[-1].position[0] == pytest.approx(0.0, abs=1e-6)
+    assert graph.status()[1]['trials'] == '0'
+
+
+def test_points_that_come_with_each_image_are_followed(make_graph):
+    graph = make_graph(look_at_hold_s=0.15)
+    graph.image()
+    for step in range(12):
+        graph.look_at(1.0, 0.05 * step, 0.0)
+        graph.image()
+        assert graph.phase() == 'look_at'
+        assert graph.pan == pytest.approx(math.atan(0.05 * step), abs=1e-6)
+
+
+def test_a_point_seen_by_the_camera_uses_the_posture_at_its_stamp(graph):
+    """The head has turned on since; the posture of that image counts, not the newest."""
+    for _ in range(4):
+        graph.image()
+    seen_ns, pan = graph.stamp_ns - PERIOD_NS // 2, graph.pan
+    at_stamp = pan + SPEED * PERIOD_NS / 1e9 / 2  # between the last two images
+    at_stamp = at_stamp + SPEED * PERIOD_NS / 1e9  # the command is one image ahead of the head
+    graph.look_at(0.2, 0.0, 2.0, frame='camera_optical_frame', stamp_ns=seen_ns)
+    for _ in range(6):
+        graph.image()
+    assert graph.pan == pytest.approx(at_stamp - math.atan(0.1), abs=1e-3)
+
+
+def test_a_point_of_the_camera_waits_for_the_joint_states_of_its_time(graph):
+    for _ in range(2):
+        graph.image()
+    later = graph.stamp_ns + PERIOD_NS // 2
+    graph.look_at(0.0, 0.0, 1.0, frame='camera_optical_frame', stamp_ns=later)
+    before = graph.pan
+    graph.image()
+    assert graph.phase() == 'look_at'
+    for _ in range(4):
+        graph.image()
+    assert graph.pan == pytest.approx(before / 2, abs=1e-3), 'half way of its last motion'
+
+
+def test_a_stamp_of_zero_is_now(graph):
+    graph.image()
+    graph.look_at(0.5, 0.0, 1.0, frame='camera_optical_frame', stamp_ns=0)
+    for _ in range(4):
+        graph.image()
+    assert graph.pan == pytest.approx(-math.atan(0.5), abs=1e-6)
+    graph.look_at(1.0, 0.1, 0.0, stamp_ns=0)
+    for _ in range(4):
+        graph.image()
+    assert graph.pan == pytest.approx(math.atan(0.1), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ('point', 'frame', 'late_s', 'reason'),
+    [
+        ((1.0, 0.0, 0.0), 'map', 0.0, "'map' is not known: give the point in 'base_link'"),
+        ((1.0, 0.0, 0.0), '', 0.0, "the frame '' is not known"),
+        ((math.nan, 0.0, 0.0), 'base_link', 0.0, 'the point is not finite'),
+        ((0.0, 0.0, 0.0), 'camera_optical_frame', 0.0, 'it has no direction'),
+        ((-1.0, 0.1, 0.0), 'base_link', 0.0, 'the point is behind the head'),
+        ((0.0, 0.0, -1.0), 'camera_optical_frame', 0.0, 'the point is behind the head'),
+        ((1.0, 0.0, 0.0), 'base_link', 0.7, 'the point is 0.7 s old'),
+        ((1.0, 0.0, 0.0), 'camera_optical_frame', 0.7, 'the point is 0.7 s old'),
+        ((1.0, 0.0, 0.0), 'base_link', -60.0, 'stamped 60 s ahead of the clock of the gate'),
+        ((1.0, 0.0, 0.0), 'camera_optical_frame', -60.0, 'ahead of the clock of the gate'),
+    ],
+)
+def test_a_point_that_cannot_be_used_is_one_warning_and_changes_nothing(
+    make_graph, point, frame, late_s, reason
+):
+    graph = make_graph(pan_min_rad=-1.5, pan_max_rad=1.5)
+    for _ in range(2):
+        graph.image()
+    commands = []
+    for _ in range(3):
+        graph.look_at(*point, frame=frame, stamp_ns=graph.stamp_ns - int(late_s * 1e9))
+        commands.append(graph.image().position[0])
+        assert graph.phase() == 'look'
+    assert np.diff(commands) == pytest.approx(-SPEED * PERIOD_NS / 1e9), 'the face, as before'
+    complaint = graph.bench.complaint()
+    assert complaint.startswith('/look_at: refused: ')
+    assert reason in complaint
+    assert graph.bench.node.health.report(time.monotonic()).level is Level.WARN
+
+
+def test_a_point_beyond_the_limits_is_looked_at_as_far_as_they_allow(make_graph):
+    graph = make_graph(pan_max_rad=0.5)
+    graph.image()
+    graph.look_at(1.0, 5.0, 0.0)
+    for _ in range(5):
+        graph.image()
+    assert graph.pan == pytest.approx(0.48)
+    assert graph.status()[1]['clamped'] == 'position'
+
+
+def test_no_point_moves_a_disabled_or_held_head(make_graph):
+    graph = make_graph(enabled_at_start=False)
+    graph.image()
+    graph.look_at(*NOT_AHEAD)
+    for _ in range(3):
+        assert graph.image().position[0] == 0.0
+    assert 'refused: the gate is disabled: call gate/enable first' in graph.bench.complaint()
+    graph.bench.call(SetBool, 'gate/enable', data=True)
+    for _ in range(2):
+        graph.image({})
+    assert graph.pan == 0.0
+    graph.look_at(*NOT_AHEAD)
+    graph.image({})
+    assert graph.phase() == 'look_at'
+    graph.bench.call(SetBool, 'gate/enable', data=False)
+    held = graph.image({}).position
+    for _ in range(3):
+        assert graph.image({}).position == held
+    graph.bench.call(SetBool, 'gate/enable', data=True)
+    for _ in range(3):
+        assert graph.image({}).position == held, 'the point is over'
+
+
+def test_a_held_head_refuses_points_with_the_reason(make_graph):
+    graph = make_graph(limits_from='robot_description')
+    graph.image()
+    graph.look_at(*NOT_AHEAD)
+    assert 'refused: the head is held: no robot_description yet' in graph.bench.complaint()
+
+
+def test_clear_look_at_ends_it(graph):
+    response = graph.bench.call(Trigger, 'gate/clear_look_at')
+    assert (response.success, response.message) == (True, 'the head looked at no point')
+    for _ in range(2):
+        graph.image({FACE_DELTA: (0.0, 0.0)})
+    graph.look_at(*NOT_AHEAD)
+    graph.image({})
+    response = graph.bench.call(Trigger, 'gate/clear_look_at')
+    assert (response.success, response.message) == (True, 'looking at the caregiver again')
+    for _ in range(3):
+        graph.image({})
+        assert graph.phase() == 'look'
+    assert graph.pan == pytest.approx(0.0, abs=1e-6)
+
+
+def test_home_and_a_point_end_each_other(make_graph):
+    graph = make_graph(home_pan_rad=-0.3)
+    graph.image({})
+    graph.look_at(*NOT_AHEAD)
+    graph.image({})
+    graph.bench.call(Trigger, 'gate/home')
+    graph.image({})
+    assert graph.phase() == 'home'
+    graph.look_at(*NOT_AHEAD)
+    for _ in range(4):
+        graph.image({})
+    assert graph.pan == pytest.approx(AHEAD_OF_IT[0], abs=1e-6)
+
+
+def test_what_interrupts_a_trial_is_published_with_the_stamps_of_its_images(graph):
+    def interrupted():
+        """Return how many images ago each interruption was, since the last call."""
+        messages = graph.bench.messages(INTERRUPTED)
+        found = [(graph.stamp_ns - to_ns(each.stamp)) // PERIOD_NS for each in messages]
+        messages.clear()
+        return found
+
+    waits = graph.bench.wait
+    for _ in range(4):
+        graph.image({})
+    assert interrupted() == [], 'not by the start'
+    graph.look_at(*NOT_AHEAD)
+    waits(lambda: graph.bench.messages(INTERRUPTED))
+    assert interrupted() == [0], 'at once'
+    for _ in range(2):
+        graph.image({})
+        waits(lambda: graph.bench.messages(INTERRUPTED))
+        assert interrupted() == [0]
+    graph.bench.call(Trigger, 'gate/clear_look_at')
+    for _ in range(3):
+        graph.image({})
+        graph.status()
+    assert interrupted() == []
+    for service, request in ((Trigger, {}), (SetBool, {'data': False})):
+        graph.bench.call(service, 'gate/home' if service is Trigger else 'gate/enable', **request)
+        for _ in range(3):
+            graph.image({}, follow=False)
+            waits(lambda: graph.bench.messages(INTERRUPTED))
+        assert interrupted()[-1] == 0
+
+
+@pytest.mark.parametrize(('kind', 'name', 'request_'), [
+    (SetBool, 'enable', {'data': True}), (Trigger, 'home', {}),
+])  # fmt: skip
+def test_old_names_of_services_work_with_one_warning(graph, capfd, kind, name, request_):
+    graph.image()
+    assert graph.bench.call(kind, f'gate/{name}', **request_).success
+    assert 'was called' not in capfd.readouterr().err
+    for _ in range(2):
+        assert graph.bench.call(kind, name, **request_).success
+    text = f'/{name} was called, which the next release will not have: call /gate/{name}'
+    assert capfd.readouterr().err.count(text) == 1
+
+
+def test_a_point_in_real_time_is_followed_at_the_control_rate(real_time):
+    rig = real_time(hold_after_s=5.0, stall_after_s=5.0, stale_after_s=5.0)
+    rig.images(lambda: rig.pan < -0.1)
+    rig.bench.publish(LOOK_AT, point_stamped((0.0, 0.0, 1.0), 'map', time.time_ns()))
+    rig.bench.wait_for_complaint("the frame 'map' is not known")
+
+    def pointed():
+        rig.bench.publish(LOOK_AT, point_stamped((1.0, 0.5, 0.0), 'base_link', time.time_ns()))
+        return abs(rig.pan - math.atan(0.5)) < 0.01
+
+    rig.images(pointed)
+    status = rig.bench.messages(GATE_STATUS)[-1]
+    assert status.message == 'look_at'

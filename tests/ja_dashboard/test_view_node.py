@@ -449,13 +449,13 @@ def test_buttons_call_services_and_log_the_answer(bench):
         response.success, response.message = len(asked) == 1, 'done'
         return response
 
-    bench.peer.create_service(SetBool, 'enable', answer)
-    bench.peer.create_service(Trigger, 'home', answer)
-    bench.wait(lambda: {'enable', 'home'} <= bench.node.frame.services)
-    bench.node.call_switch('enable', False)
-    wait_for_log(bench, 'enable: done')
-    bench.node.call_trigger('home')
-    wait_for_log(bench, 'home: refused: done')
+    bench.peer.create_service(SetBool, 'gate/enable', answer)
+    bench.peer.create_service(Trigger, 'gate/home', answer)
+    bench.wait(lambda: {'gate/enable', 'gate/home'} <= bench.node.frame.services)
+    bench.node.call_switch('gate/enable', False)
+    wait_for_log(bench, 'gate/enable: done')
+    bench.node.call_trigger('gate/home')
+    wait_for_log(bench, 'gate/home: refused: done')
     assert asked == [False, None]
     bench.node.call_trigger('sim/step')
     wait_for_log(bench, 'sim/step: no node offers this service')

@@ -82,7 +82,7 @@ def test_buttons_make_requests_and_a_reset_asks_first():
         user.find(marker='sim/pause').click()
         user.find('reset learning').click()
         await user.should_see('The learner will start from initial weights.')
-        assert model.requests == [('home',), ('sim/pause', True)]
+        assert model.requests == [('gate/home',), ('sim/pause', True)]
         user.find('keep everything').click()
         # The page deletes the dialog after it has dealt with the answer.
         await until(lambda: not dialogs(user))

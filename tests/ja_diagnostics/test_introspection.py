@@ -40,7 +40,7 @@ def dumped(client: AsyncParameterClient, ask: Ask) -> dict[str, Any]:
 
 
 def test_parameters_survive_dump_and_load(domain: int, tmp_path: Path) -> None:
-    """By `ros2 param load`, which sets what may change, and as the file of a new node."""
+    """By `ros2 param load`, which refuses nothing, and as the file of a new node."""
     path = tmp_path / 'dump.yaml'
     with every_node(ALL) as nodes:
         tool = rclpy.create_node('tool', context=nodes[0].context)
@@ -61,8 +61,8 @@ def test_parameters_survive_dump_and_load(domain: int, tmp_path: Path) -> None:
             }
             described = ask(client.describe_parameters, names).descriptors
             fixed = {d.name for d in described if d.read_only}
-            assert refused.keys() == fixed, refused
-            assert all('read-only' in reason for reason in refused.values())
+            assert fixed, 'rclpy itself gives every node one that is read-only'
+            assert not refused, refused
             assert dumped(client, ask) == before[node.get_name()]
         tool.destroy_node()
     # These must be given, and were.

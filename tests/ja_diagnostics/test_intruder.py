@@ -28,7 +28,7 @@ with hosts.far_host() as host, private_executor() as executor:
         calls.append(request.data)
         response.success = True
         return response
-    node.create_service(SetBool, 'enable', enable)
+    node.create_service(SetBool, 'gate/enable', enable)
     executor.add_node(node)
     intruder = hosts.start_intruder(host, float(sys.argv[1]))
     while intruder.poll() is None:
@@ -68,7 +68,7 @@ def test_in_the_range_of_this_machine_no_other_host_gets_in(environ):
 @pytest.mark.skipif(hosts.missing() != '', reason=hosts.missing())
 def test_a_graph_on_the_network_is_found_and_obeys():
     found, calls = run_near(30.0, ROS_AUTOMATIC_DISCOVERY_RANGE='SUBNET')
-    assert found == {'nodes': ['gate'], 'obeyed': ['/enable']}
+    assert found == {'nodes': ['gate'], 'obeyed': ['/gate/enable']}
     assert calls == 1
 
 

@@ -21,6 +21,7 @@ from ja_common.topics import (
     FACE_IMAGE,
     FIXATION,
     GLANCE_DELTA,
+    INTERRUPTED,
     JOINT_STATES,
     LM_DELTA,
 )
@@ -37,7 +38,7 @@ ATTENDED = Detection(Kind.FACE, 0.0, 0.0, 0, 0, 40, 48, 1.0, attended=True)
 BALL = Detection(Kind.OBJECT, -0.2, 0.1, 0, 0, 10, 10, 1.0)
 PASSING = Detection(Kind.FACE, 0.1, 0.0, 0, 0, 40, 48, 1.0)
 FACE = np.random.default_rng(0).integers(0, 256, (30, 25)).astype(np.uint8)
-PUBLISHED = [DETECTIONS, FACE_IMAGE, FIXATION, JOINT_STATES]
+PUBLISHED = [DETECTIONS, FACE_IMAGE, FIXATION, INTERRUPTED, JOINT_STATES]
 
 
 class NodeTrials:
@@ -70,6 +71,11 @@ class NodeTrials:
         before = self.learned
         self.send_fixation(0.3, direction)
         assert self.learned == before + 1
+
+    def send_interruption(self):
+        before = self.bench.received(INTERRUPTED)
+        self.bench.publish(INTERRUPTED, header(self.ms * MS, ''))
+        self.bench.wait(lambda: self.bench.received(INTERRUPTED) > before)
 
     @property
     def learned(self):
@@ -152,6 +158,17 @@ def test_postures_at_rest_are_learned_and_those_passed_on_the_way_are_not(trials
     assert list(trials.send_look().position) == pytest.approx(
         network.predict(FACE, (0, 0)), abs=1e-7
     )
+
+
+def test_a_trial_that_the_gate_has_interrupted_is_not_learned(trials):
+    trials.send_look()
+    trials.send_interruption()
+    trials.send_fixation(0.3, (0.4, 0.1))
+    trials.send_look()
+    assert trials.learned == 0, 'neither as fixated nor as given up'
+    trials.send_look()
+    trials.send_fixation(0.3, (0.4, 0.1))
+    assert trials.learned == 1
 
 
 def test_learning_moves_the_proposal_towards_the_fixation(make_trials):

@@ -101,3 +101,25 @@ def test_nothing_is_proposed_between_trials(head, log):
     assert head.pipeline.draw_belief(np.random.default_rng(0)).shape == (BELIEF_SAMPLES, 2)
     head.pipeline.drop_trial()
     assert head.rest(0.3).delta is None
+
+
+def test_an_interrupted_trial_is_never_handed_over(head, log):
+    head.look()
+    interrupted_ns = head.stamp_ns
+    head.rest(0.3, [(0.1, 0.0)])
+    head.pipeline.interrupt_trial(interrupted_ns)
+    head.rest(0.5, [(0.1, 0.0)])
+    assert head.pipeline.process_fixation(head.at(0.5), (0.6, 0.0)) is None
+    head.look()
+    assert not {'fixated', 'given up'} & set(log.events)
+    head.rest(0.3, [(0.1, 0.0)])
+    assert head.pipeline.process_fixation(head.at(0.3), (0.4, 0.0)) is not None, 'the next one'
+
+
+def test_an_interruption_that_comes_late_leaves_the_next_trial_alone(head, log):
+    head.look()
+    interrupted_ns = head.stamp_ns
+    head.look()
+    head.pipeline.interrupt_trial(interrupted_ns)
+    head.rest(0.3, [(0.1, 0.0)])
+    assert head.pipeline.process_fixation(head.at(0.3), (0.4, 0.1)) is not None

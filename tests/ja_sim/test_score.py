@@ -112,3 +112,40 @@ def test_nothing_is_known_before_the_first_trial():
     assert math.isnan(Rate(0, 0).rate)
     assert Rate(0, 0).interval == (0.0, 1.0)
     assert Rate(0, 50).interval[0] == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize('early', [True, False])
+@pytest.mark.parametrize(
+    ('interrupted_s', 'fixations', 'counts'),
+    [
+        (7, [None, None], False),
+        (8, [None, None], False),
+        (7, [None, LEFT], False),
+        (8, [None, LEFT], True),  # the fixation of that image had ended it
+        (9, [None, LEFT], True),
+        (6, [None, None], True),  # before its look
+    ],
+)
+def test_an_interrupted_trial_does_not_count(score, early, interrupted_s, fixations, counts):
+    def image(stamp_s, trial, fixation=None):
+        fixation = None if fixation is None else np.array(fixation)
+        return score.score_image(truth(trial, stamp_s=stamp_s), fixation)
+
+    if early:
+        score.interrupt_trial(interrupted_s * S)
+    image(7, 1, fixations[0])
+    image(8, 1, fixations[1])
+    if not early:
+        score.interrupt_trial(interrupted_s * S)
+    assert (image(10, 2) is not None) == counts
+    image(11, 2, LEFT)
+    assert image(12, 3).success, 'the next one counts'
+    assert score.rates()['all'].trials == 1 + counts
+
+
+def test_an_interruption_before_a_reset_of_the_clock_is_forgotten(score):
+    play(score, 1, [None], stamp_s=700)
+    score.interrupt_trial(700 * S)
+    score.score_image(truth(0, stamp_s=1), None)
+    play(score, 1, [LEFT], stamp_s=2)
+    assert play(score, 2, [None], stamp_s=3).success

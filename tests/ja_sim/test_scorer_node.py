@@ -8,7 +8,7 @@ from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from ja_common.point_cloud_codec import encode_columns
-from ja_common.topics import FIXATION, SCORE, SIM_TRUTH, SUCCESS_RATE
+from ja_common.topics import FIXATION, INTERRUPTED, SCORE, SIM_TRUTH, SUCCESS_RATE
 from ja_sim.scorer_node import ScorerNode
 from ja_sim.truth_codec import FIELDS
 from node_bench import header, joint_state
@@ -61,7 +61,7 @@ def told_rate(course):
 @pytest.fixture
 def make_course(make_bench):
     def make(**parameters):
-        sent, received = [SIM_TRUTH, FIXATION], [SUCCESS_RATE, SCORE]
+        sent, received = [SIM_TRUTH, FIXATION, INTERRUPTED], [SUCCESS_RATE, SCORE]
         return Course(make_bench(ScorerNode, sent, received, **parameters))
 
     return make
@@ -84,6 +84,17 @@ def test_success_failure_and_giving_up(make_course):
         course.bench.wait(lambda rate=rate: told_rate(course) == pytest.approx(rate, abs=1e-6))
     low, high = map(float, values['all interval'].split())
     assert 0.0 < low < 1 / 3 < high < 1.0
+
+
+def test_an_interrupted_trial_does_not_count(make_course):
+    course = make_course()
+    course.image(1)
+    course.bench.publish(INTERRUPTED, header(course.stamp_ns))
+    course.bench.wait(lambda: course.bench.received(INTERRUPTED) == 1)
+    course.image(1, RIGHT)
+    course.image(2, LEFT)
+    course.image(3)
+    assert course.score_after(1)[0] == '1 of 1 trials'
 
 
 def test_order_of_the_two_topics_does_not_matter(make_course):

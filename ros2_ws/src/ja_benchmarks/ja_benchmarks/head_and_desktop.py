@@ -1,7 +1,7 @@
 """`python -m ja_benchmarks.head_and_desktop SPLIT FOLDER`: a graph on two hosts, a bad cable.
 
-It runs inside the near host, which is the head's, and prints what was measured as JSON. `run_split`
-starts it in namespaces of Linux, as root; all that it makes ends with it.
+It runs inside the near host, which is the head's, and prints what was measured as JSON.
+`run_split` starts it in namespaces of Linux, as root; all that it makes ends with it.
 """
 
 import json

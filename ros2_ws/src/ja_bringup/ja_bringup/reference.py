@@ -21,7 +21,7 @@ from ja_bringup.sros_policy import policy_xml
 from ja_common.core.files import check_writable, write_file
 from ja_common.core.parameter_page import OF_EVERY_NODE, PAGE
 from ja_common.graph_node import GraphNode
-from ja_common.parameters import UNBOUNDED
+from ja_common.parameters import READ_ONLY, UNBOUNDED
 from ja_common.private_context import private_context
 from ja_common.qos_text import offered_text
 from ja_common.rclpy_private import parameter_names
@@ -138,6 +138,7 @@ def topics_page(nodes: list[GraphNode]) -> str:
     """Return the tables of topics and services, in Markdown."""
     publishers, subscribers = defaultdict(list), defaultdict(list)
     services: dict[str, tuple[type, list[str]]] = {}
+    new_names: dict[str, str] = {}
     for node in nodes:
         for topic in node.published_topics.values():
             publishers[topic.name].append(node.get_name())
@@ -145,6 +146,7 @@ def topics_page(nodes: list[GraphNode]) -> str:
             subscribers[topic.name].append(node.get_name())
         for name, service in node.advertised_services.items():
             services.setdefault(name.lstrip('/'), (service, []))[1].append(node.get_name())
+        new_names |= {old.lstrip('/'): new for old, new in node.renamed_services.items()}
     rows = [
         f'| `{topic.name}` | {_type_name(topic.type)} | {_names(publishers[topic.name], nodes)} '
         f'| {_names(subscribers[topic.name], nodes)} '
@@ -153,7 +155,8 @@ def topics_page(nodes: list[GraphNode]) -> str:
         for topic in TOPICS
     ]
     service_rows = [
-        f'| `{name}` | {_type_name(service)} | {_names(offered, nodes)} |\n'
+        f'| `{name}`{_old_name(new_names.get(name))} | {_type_name(service)} '
+        f'| {_names(offered, nodes)} |\n'
         for name, (service, offered) in sorted(services.items())
     ]
     return _TOPICS_HEAD + ''.join(rows) + _SERVICES_HEAD + ''.join(service_rows)
@@ -170,7 +173,9 @@ def parameters_page(nodes: list[GraphNode]) -> str:
                 continue
             descriptor = node.describe_parameter(name)
             shown = _default(node, name)
-            text = descriptor.description + (' (*fixed*)' if descriptor.read_only else '')
+            text = descriptor.description
+            if descriptor.read_only:
+                text = f'{text.removesuffix(READ_ONLY)} (*fixed*)'
             rows.append(f'| `{name}` | `{shown}` | {_range(descriptor)} | {text} |\n')
         sections.append(head + '|---|---|---|---|\n' + ''.join(rows))
     return _PARAMETERS_HEAD + ''.join(sections)
@@ -185,6 +190,10 @@ def _names(names: list[str], nodes: list[GraphNode]) -> str:
     if len(names) == len(nodes):
         return 'every node'
     return ', '.join(f'`{name}`' for name in names) or '-'
+
+
+def _old_name(new: str | None) -> str:
+    return '' if new is None else f' (old name of `{new.lstrip("/")}`)'
 
 
 def _qos(profile: QoSProfile) -> str:

@@ -10,7 +10,7 @@ class HeadHold:
     """Calls the gate's `enable`. It enables only what it has disabled itself."""
 
     def __init__(self, node: GraphNode) -> None:
-        self._client = node.create_client(SetBool, 'enable')
+        self._client = node.create_client(SetBool, 'gate/enable')
         self._holds = False
         self._pending: Future | None = None
 

@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
@@ -56,6 +58,7 @@ class GraphNode(Node):
         self.subscribed_topics: dict[str, Topic] = {}
         self.published_topics: dict[str, Topic] = {}
         self.advertised_services: dict[str, Any] = {}
+        self.renamed_services: dict[str, str] = {}  # old name -> new one
         self._unread_parameters: list[str] = []
         self._reports_without_clock = 0
         self._diagnostics = self.create_topic_publisher(DIAGNOSTICS)
@@ -185,6 +188,53 @@ class GraphNode(Node):
 
         service = self.create_service(service_type, name, guarded)
         self.advertised_services[service.srv_name] = service_type
+
+    def advertise_renamed_service(
+        self, service_type: Any, name: str, old_name: str, callback: Callable[[Any, Any], Any]
+    ) -> None:
+        """Offer a service, for one more release also under its old name, with one warning."""
+
+        has_warned = False
+        old, new = (self.resolve_service_name(each) for each in (old_name, name))
+
+        def call_by_old_name(request: Any, response: Any) -> Any:
+            nonlocal has_warned
+            if not has_warned:
+                has_warned = True
+                self.get_logger().warning(
+                    f'the service {old} was called, which the next release will not have: call '
+                    f'{new}'
+                )
+            return callback(request, response)
+
+        self.advertise_service(service_type, name, callback)
+        self.advertise_service(service_type, old_name, call_by_old_name)
+        self.renamed_services[old] = new
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set parameters as rclpy does; a read-only one may be set to the value that it has.
+
+        So `ros2 param load` takes back what `ros2 param dump` has written.
+        """
+        changed = [each for each in parameter_list if not self._is_unchanged_read_only(each)]
+        if parameter_list and not changed:
+            return SetParametersResult(successful=True)
+        return super().set_parameters_atomically(changed)
+
+    def _is_unchanged_read_only(self, parameter: Parameter) -> bool:
+        if not self.has_parameter(parameter.name):
+            return False
+        if not self.describe_parameter(parameter.name).read_only:
+            return False
+        known = self.get_parameter(parameter.name)
+        value = known.value
+        if known.type_ is Parameter.Type.STRING and parameter.type_ is Parameter.Type.BOOL:
+            # rclpy's reader of parameter files takes the quotes off: 'off' arrives as False.
+            value = {'on': True, 'yes': True, 'off': False, 'no': False}.get(value)
+            return bool(value is parameter.value)
+        whole = (Parameter.Type.INTEGER, Parameter.Type.DOUBLE)  # `1` for a float that is 1.0
+        kinds = (parameter.type_, known.type_)
+        return (kinds[0] == kinds[1] or kinds == whole) and bool(parameter.value == value)
 
     def namespaced_folder(self, folder: str | Path) -> Path:
         """Return the subfolder for the files of this node's namespace: one for each head."""

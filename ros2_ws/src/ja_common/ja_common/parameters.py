@@ -23,8 +23,11 @@ UNBOUNDED = 1e9
 """Stands in a descriptor for an end that a range does not have."""
 
 
-# Describes what ROS's descriptors have no field for.
-_CHOICES = ' (one of '
+READ_ONLY = ' (read-only)'
+"""Ends the description of a read-only parameter."""
+
+# In `additional_constraints`: ROS's descriptors have no field for choices.
+_ONE_OF = 'one of: '
 
 
 def declare_config(
@@ -91,19 +94,27 @@ def _as_float(parameter: Parameter) -> Parameter:
 
 def choices_of(descriptor: ParameterDescriptor) -> tuple[str, ...]:
     """Return the choices of a parameter that `declare_config` declared; () when it has none."""
-    _, found, choices = descriptor.description.rpartition(_CHOICES)
-    return tuple(choices.rstrip(')').split(', ')) if found else ()
+    before, found, choices = descriptor.additional_constraints.partition(_ONE_OF)
+    return tuple(choices.split(', ')) if found and not before else ()
 
 
 def _descriptor(config_field: Any, read_only: bool) -> ParameterDescriptor:
     meta = config_field.metadata
     low, high = meta.get('low'), meta.get('high')
-    text = meta['description']
+    text, constraints = meta['description'], ''
     if meta.get('choices'):
-        text += f'{_CHOICES}{", ".join(meta["choices"])})'
+        choices = ', '.join(meta['choices'])
+        text += f' (one of {choices})'
+        constraints = f'{_ONE_OF}{choices}'
+    if read_only:
+        text += READ_ONLY
     # dynamic_typing lets `1` stand for `1.0`; the configuration then checks type and range.
     descriptor = ParameterDescriptor(
-        name=config_field.name, description=text, dynamic_typing=True, read_only=read_only
+        name=config_field.name,
+        description=text,
+        additional_constraints=constraints,
+        dynamic_typing=True,
+        read_only=read_only,
     )
     if low is not None or high is not None:
         bounds = (-UNBOUNDED if low is None else low, UNBOUNDED if high is None else high)

@@ -105,6 +105,11 @@ class Synchroniser:
         return self._history.newest
 
     @property
+    def history(self) -> PostureHistory:
+        """Return the postures of the last seconds, which stays the same object."""
+        return self._history
+
+    @property
     def waits_for_posture(self) -> bool:
         """Return whether a set waits for the joint states of its time."""
         return len(self._strict) + len(self._patient or ()) > 0

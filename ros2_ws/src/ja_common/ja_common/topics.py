@@ -12,7 +12,7 @@ from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, JointState, PointCloud2
-from std_msgs.msg import Float32, Float64MultiArray, String
+from std_msgs.msg import Float32, Float64MultiArray, Header, String
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
 
@@ -77,8 +77,18 @@ JOINT_STATES = Topic('joint_states', JointState, 'measured posture of the head',
 DETECTIONS = Topic(
     'detections', PointCloud2, 'objects and faces of one image, empty ones too', **_LINK
 )
-TARGET = Topic('target', PointStamped, 'ray to the most salient object (Eq. 1)', **_LINK)
-FACE = Topic('face', PointStamped, "ray to the caregiver's face", **_LINK)
+TARGET = Topic(
+    'salient_feature_detector/target',
+    PointStamped,
+    'ray to the most salient object (Eq. 1); while subscribed',
+    **_LINK,
+)
+FACE = Topic(
+    'salient_feature_detector/face',
+    PointStamped,
+    "ray to the caregiver's face; while subscribed",
+    **_LINK,
+)
 FACE_IMAGE = Topic(
     'face_image', Image, "the caregiver's face, 30 rows x 25 columns, while attended", **_LINK
 )
@@ -180,6 +190,20 @@ CAMERA_POSE = Topic(
 GATE_STATUS = Topic(
     'gate/status', DiagnosticStatus, 'phase, source, p(LM), limits, reason of a hold', **_LINK
 )
+INTERRUPTED = Topic(
+    'gate/interrupted',
+    Header,
+    'while the head is held, turns home or looks at a point of `look_at`: stamp of each image; a '
+    'trial with a look at this stamp or before is none',
+    **_LINK,
+)
+LOOK_AT = Topic(
+    'look_at',
+    PointStamped,
+    'point to look at [m], in the base frame or the optical frame of the camera',
+    publisher_qos=_qos(True, 10),
+    subscriber_qos=_qos(False, 10),
+)
 MARKERS = Topic(
     'markers',
     MarkerArray,
@@ -213,6 +237,12 @@ EVERY_SCORE = replace(
     SCORE, subscriber_qos=QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 )
 """`SCORE` for a subscriber that counts the trials: no message may be lost."""
+
+OLD_TARGET = replace(TARGET, name='target', purpose=f'old name of `{TARGET.name}`')
+OLD_FACE = replace(FACE, name='face', purpose=f'old name of `{FACE.name}`')
+
+NEW_NAMES = {OLD_TARGET.name: TARGET.name, OLD_FACE.name: FACE.name}
+"""Old names of topics, which work for one more release, and the new ones."""
 
 TOPICS = tuple(
     value

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rclpy.clock import Clock, ClockType
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Header, String
@@ -21,12 +22,14 @@ from ja_common.node_main import spin_node
 from ja_common.point_cloud_codec import decode_columns
 from ja_common.reported_save import ReportedSave
 from ja_common.synchroniser import StampedSet, Synchroniser
+from ja_common.time_codec import to_time
 from ja_common.topics import (
     EVIDENCE,
     FACE_DELTA,
     FIXATION,
     GATE_STATUS,
     GLANCE_DELTA,
+    INTERRUPTED,
     JOINT_STATES,
     LM_DELTA,
     ROBOT_DESCRIPTION,
@@ -43,10 +46,12 @@ from ja_control.core.command_guard import Command, CommandGuard, CommandGuardCon
 from ja_control.core.gating import Gating, GatingConfig
 from ja_control.core.hold import Cause, Hold
 from ja_control.core.joint_limits import JointLimitsConfig
+from ja_control.core.look_at import LookAtConfig
 from ja_control.core.trial_count import load_trials, save_trials
 from ja_control.core.urdf_joint import read_joint
 from ja_control.core.urdf_limits import narrow_limits
 from ja_control.gate_status import describe_unseen, encode_gate_status
+from ja_control.look_at_input import LookAtInput
 
 _PROPOSALS = (VF_DELTA, FACE_DELTA, LM_DELTA, GLANCE_DELTA, FIXATION)
 _EVIDENCE_COLUMNS = ('log_evidence', 'expected_gain')
@@ -60,7 +65,9 @@ class GateConfig(Configuration):
     """What the gate needs beyond the cycle, the gating and the guard."""
 
     seed: int = parameter(0, 'seed of the draws between VF and LM', low=0)
-    enabled_at_start: bool = parameter(True, 'move from the start, without a call of `enable`')
+    enabled_at_start: bool = parameter(
+        True, 'move from the start, without a call of `gate/enable`'
+    )
     lockstep: bool = parameter(
         False,
         'take the time from the images: one command an image, and no input is ever late '
@@ -124,14 +131,25 @@ class GateNode(GraphNode):
         self._guard_hold: Hold | None = None
         self._hold: Hold | None = None
         self._status_s = -np.inf
+        self._has_decided = False
 
         self._synchroniser = Synchroniser(self, self._joints)
         deltas = dict.fromkeys(_PROPOSALS, self._joints.decode)
         self._synchroniser.call_with({**deltas, EVIDENCE: _decode_evidence}, self._act)
+        self._look_at = LookAtInput(
+            self,
+            self.configure(LookAtConfig),
+            self._synchroniser.history,
+            self._check_point,
+            lambda direction: self._guard.limits.reachable(direction),
+            self._turn_to,
+        )
+        self._interrupted = self.create_topic_publisher(INTERRUPTED)
         self._output = CommandOutput(self, self.configure(CommandOutputConfig))
         self._status = self.create_topic_publisher(GATE_STATUS)
-        self.advertise_service(SetBool, 'enable', self._on_enable)
-        self.advertise_service(Trigger, 'home', self._on_home)
+        self.advertise_renamed_service(SetBool, 'gate/enable', 'enable', self._on_enable)
+        self.advertise_renamed_service(Trigger, 'gate/home', 'home', self._on_home)
+        self.advertise_service(Trigger, 'gate/clear_look_at', self._on_clear_look_at)
         if self._config.limits_from == 'robot_description':
             self._guard.blocked = f'no {ROBOT_DESCRIPTION.name} yet'
             self.subscribe(ROBOT_DESCRIPTION, self._on_robot_description)
@@ -210,6 +228,7 @@ class GateNode(GraphNode):
         self._header, self._stamp_ns = found.header, posture.stamp_ns
         now_s = self._now_s()
         self._guard.record_image(now_s, self._age_s(posture.stamp_ns))
+        self._look_at.use_waiting()
         try:
             self._decision = self._decide(found)
         finally:
@@ -222,6 +241,9 @@ class GateNode(GraphNode):
     def _decide(self, found: StampedSet) -> Decision | None:
         if not self._guard.engaged:
             self._cycle.restart()
+            if self._has_decided:  # before the first image there was no trial
+                self._interrupt_trial()
+            self._has_decided = True
             return None
         trials = self._cycle.trials
         decision = self._cycle.step(
@@ -237,9 +259,43 @@ class GateNode(GraphNode):
             )
         )
         self._guard.set_target(decision.target)
+        if self._cycle.is_interrupted:
+            self._interrupt_trial()
         if decision.trials != trials and self._trials_save is not None:
             self._trials_save.request()
         return decision
+
+    def _interrupt_trial(self) -> None:
+        """Publish that no trial with a look at the newest image, or before it, counts."""
+        self._interrupted.publish(Header(stamp=to_time(self._stamp_ns)))
+
+    def _check_point(self, stamp_ns: int) -> None:
+        """Raise ValueError while the head cannot turn to a point with this stamp."""
+        if not self._guard.enabled:
+            raise ValueError('the gate is disabled: call gate/enable first')
+        if not self._guard.engaged:
+            reason = f': {self._hold.text}' if self._hold is not None else ''
+            raise ValueError(f'the head is held{reason}')
+        if stamp_ns == 0:
+            return  # as in tf: now
+        # In lockstep the images give the time.
+        lockstep = self._config.lockstep
+        now_ns = self._stamp_ns if lockstep else self.get_clock().now().nanoseconds
+        age_s, stale_after_s = (now_ns - stamp_ns) / NS_PER_S, self._guard.config.stale_after_s
+        if age_s > stale_after_s:
+            raise ValueError(
+                f'the point is {age_s:.3g} s old: stamp it with the time for which it holds, or '
+                f'with 0 for now (stale_after_s is {stale_after_s:g})'
+            )
+        if age_s < -stale_after_s:
+            raise ValueError(
+                f'the point is stamped {-age_s:.3g} s ahead of the clock of the gate: synchronise '
+                'the clocks, and set use_sim_time in both nodes or in none'
+            )
+
+    def _turn_to(self, direction: NDArray[np.float64]) -> None:
+        self._cycle.look_at(direction)
+        self._interrupt_trial()
 
     def _now_s(self) -> float:
         # In lockstep time passes from image to image; on a rig it always passes.
@@ -251,6 +307,7 @@ class GateNode(GraphNode):
         return (self.get_clock().now().nanoseconds - stamp_ns) / NS_PER_S
 
     def _on_period(self) -> None:
+        self._look_at.use_waiting()
         try:
             self._step(self._now_s(), self._synchroniser.newest_posture, 1)
         except ValueError as error:
@@ -313,16 +370,30 @@ class GateNode(GraphNode):
 
     def _on_enable(self, request: SetBool.Request, response: SetBool.Response) -> Any:
         self._guard.enable(request.data)
+        if not request.data:
+            self._end_look_at()
         response.success = True
         response.message = 'enabled' if request.data else 'disabled: the head holds its posture'
         return response
 
     def _on_home(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         if not self._guard.enabled:
-            raise ValueError('the gate is disabled: call enable first')
+            raise ValueError('the gate is disabled: call gate/enable first')
+        self._look_at.drop_waiting()
         self._cycle.go_home()
+        self._interrupt_trial()
         response.success, response.message = True, 'turning to the home posture'
         return response
+
+    def _on_clear_look_at(self, _: Trigger.Request, response: Trigger.Response) -> Any:
+        response.success, response.message = True, 'the head looked at no point'
+        if self._end_look_at():
+            response.message = 'looking at the caregiver again'
+        return response
+
+    def _end_look_at(self) -> bool:
+        self._look_at.drop_waiting()
+        return self._cycle.end_look_at()
 
 
 def _decode_evidence(message: PointCloud2) -> tuple[float, float]:

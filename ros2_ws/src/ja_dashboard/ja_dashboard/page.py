@@ -132,12 +132,12 @@ class _OpenPage:
         with ui.row().classes('w-full items-center gap-2 mb-2') as row:
             self._switches = {
                 'sim/pause': self._switch('pause', 'sim/pause'),
-                'enable': self._switch('enabled', 'enable'),
+                'gate/enable': self._switch('enabled', 'gate/enable'),
             }
             self._buttons = {
                 'sim/step': self._button('one step', 'sim/step'),
                 'sim/rearrange': self._button('rearrange', 'sim/rearrange'),
-                'home': self._button('home', 'home'),
+                'gate/home': self._button('home', 'gate/home'),
                 'save_checkpoint': self._button('save checkpoint', 'save_checkpoint'),
                 'reset_learning': ui.button('reset learning', on_click=self._ask_to_reset)
                 .props('outline dense no-caps color=red')

@@ -51,9 +51,9 @@ POLL_EVERY_S = 0.1
 _ASK_EVERY_S = 2.0
 _VIEWER_STAYS_S = 3.0
 _NICENESS = 10  # on a busy processor the graph comes first
-_SWITCHES = ('enable', 'sim/pause', 'caregiver/pause')
+_SWITCHES = ('gate/enable', 'sim/pause', 'caregiver/pause')
 _TRIGGERS = (
-    'home', 'save_checkpoint', 'reset_learning', 'sim/step', 'sim/rearrange',
+    'gate/home', 'save_checkpoint', 'reset_learning', 'sim/step', 'sim/rearrange',
     'caregiver/end', 'caregiver/rearranged',
 )  # fmt: skip
 _SETTINGS = {

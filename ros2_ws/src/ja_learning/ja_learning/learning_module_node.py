@@ -23,6 +23,7 @@ from ja_common.node_main import spin_node
 from ja_common.point_cloud_codec import encode_columns
 from ja_common.realtime import enable_realtime_scheduling
 from ja_common.synchroniser import StampedSet, Synchroniser
+from ja_common.time_codec import to_ns
 from ja_common.topics import (
     BELIEF,
     DETECTIONS,
@@ -31,6 +32,7 @@ from ja_common.topics import (
     FACE_IMAGE,
     FIXATION,
     GLANCE_DELTA,
+    INTERRUPTED,
     LM_DELTA,
     Topic,
 )
@@ -108,6 +110,7 @@ class LearningModuleNode(GraphNode):
             also_which=_companions,
         )
         synchroniser.call_with({FIXATION: self._joints.decode}, self._take_fixation)
+        self.subscribe(INTERRUPTED, self._on_interrupted)
         self._delta = self.create_topic_publisher(LM_DELTA)
         self._glance_delta = self.create_topic_publisher(GLANCE_DELTA)
         self._evidence = self.create_topic_publisher(EVIDENCE)
@@ -175,6 +178,9 @@ class LearningModuleNode(GraphNode):
             return
         if self._pipeline.process_fixation(found.posture, direction) is not None:
             self._learner.report_health()
+
+    def _on_interrupted(self, message: Header) -> None:
+        self._pipeline.interrupt_trial(to_ns(message.stamp))
 
     def _update(self, trial: Trial, posture: Posture) -> None:
         if self._learning:

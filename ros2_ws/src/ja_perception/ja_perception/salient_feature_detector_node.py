@@ -28,6 +28,7 @@ from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.node_main import spin_node
 from ja_common.point_cloud_codec import encode_columns
+from ja_common.renamed_publisher import RenamedPublisher
 from ja_common.synchroniser import StampedSet, Synchroniser
 from ja_common.topics import (
     CAMERA_INFO,
@@ -39,6 +40,8 @@ from ja_common.topics import (
     IMAGE,
     IMAGE_ANNOTATED,
     IMAGE_COMPRESSED,
+    OLD_FACE,
+    OLD_TARGET,
     TARGET,
     WEIGHT_FILES,
 )
@@ -116,8 +119,8 @@ class SalientFeatureDetectorNode(GraphNode):
         )
 
         self._detections_publisher = self.create_topic_publisher(DETECTIONS)
-        self._target_publisher = self.create_topic_publisher(TARGET)
-        self._face_publisher = self.create_topic_publisher(FACE)
+        self._target_publisher = RenamedPublisher(self, TARGET, OLD_TARGET)
+        self._face_publisher = RenamedPublisher(self, FACE, OLD_FACE)
         self._face_image_publisher = self.create_topic_publisher(FACE_IMAGE)
         self._face_gaze_publisher = self.create_topic_publisher(FACE_GAZE)
         self._landmarks_publisher = self.create_topic_publisher(FACE_LANDMARKS)
@@ -224,7 +227,7 @@ class SalientFeatureDetectorNode(GraphNode):
             (self._target_publisher, percept.target),
             (self._face_publisher, caregiver_face(percept.detections)),
         ):
-            if detection is not None and publisher.get_subscription_count():
+            if detection is not None and publisher.is_subscribed:
                 publisher.publish(_point(header, detection))
 
     def _publish_annotated(

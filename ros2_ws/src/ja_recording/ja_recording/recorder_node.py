@@ -2,7 +2,7 @@
 
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from ja_common.graph_node import GraphNode
 from ja_common.message_types import message_class, schema_of
 from ja_common.node_main import spin_node
 from ja_common.qos_text import common_profile, offered_text
-from ja_common.topics import Topic
+from ja_common.topics import NEW_NAMES, Topic
 from ja_recording.background_writer import BackgroundWriter, QueuedMessage
 from ja_recording.core.default_exclude import DEFAULT_EXCLUDE
 from ja_recording.recorded_origin import origin_text, origin_topic
@@ -85,8 +85,10 @@ class RecorderNode(GraphNode):
 
     def _poll_graph(self) -> None:
         """Subscribe to the new topics of the graph; update the health of the writer."""
-        for name, types in self.get_topic_names_and_types():
-            if name not in self._known and not self._is_excluded(name):
+        present = dict(self.get_topic_names_and_types())
+        for name, types in present.items():
+            excluded = self._is_excluded(name) or _is_old_name(name, present)
+            if name not in self._known and not excluded:
                 self._subscribe_raw(name, types)
         self.health.values |= {
             'folder': str(self.folder),
@@ -158,6 +160,14 @@ class RecorderNode(GraphNode):
     def _note_origin(self, name: str, topic: Topic, data: bytes) -> None:
         """Keep in metadata.yaml what learner and eyes started from: a split file may lack it."""
         self._recording.custom_data[name] = origin_text(topic, data)
+
+
+def _is_old_name(name: str, present: Collection[str]) -> bool:
+    """Return whether a topic has what another topic has under its new name."""
+    return any(
+        name.endswith(f'/{old}') and f'{name.removesuffix(old)}{new}' in present
+        for old, new in NEW_NAMES.items()
+    )
 
 
 def main(args: list[str] | None = None) -> None:

@@ -76,7 +76,8 @@ def part_of_graph(
         raise ConfigError(
             f'no node {", ".join(unknown)} in this graph; there are {", ".join(known)}'
         )
-    here, elsewhere = [], []
+    here: list[NodeSpec] = []
+    elsewhere: list[NodeSpec] = []
     for spec in graph:
         stays = spec.executable in chosen if only else spec.executable not in chosen
         (here if stays else elsewhere).append(spec)

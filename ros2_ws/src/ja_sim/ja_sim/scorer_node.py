@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-from std_msgs.msg import Float32
+from std_msgs.msg import Float32, Header
 from std_srvs.srv import Trigger
 
 from ja_common.core.config import Configuration, parameter
@@ -14,7 +14,8 @@ from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.node_main import spin_node
 from ja_common.reported_save import ReportedSave
 from ja_common.synchroniser import StampedSet, Synchroniser
-from ja_common.topics import FIXATION, SCORE, SIM_TRUTH, SUCCESS_RATE
+from ja_common.time_codec import to_ns
+from ja_common.topics import FIXATION, INTERRUPTED, SCORE, SIM_TRUTH, SUCCESS_RATE
 from ja_sim.core.score import Score, TrialOutcome
 from ja_sim.core.trial_table import TrialTable
 from ja_sim.truth_codec import decode_truth
@@ -39,6 +40,7 @@ class ScorerNode(GraphNode):
         Synchroniser(self).call_with(
             {SIM_TRUTH: decode_truth, FIXATION: self._joints.decode}, self._score_image
         )
+        self.subscribe(INTERRUPTED, self._on_interrupted)
         self._success_rate_publisher = self.create_topic_publisher(SUCCESS_RATE)
         self._score_publisher = self.create_topic_publisher(SCORE)
         self.advertise_service(Trigger, 'sim/reset_score', self._on_reset)
@@ -61,6 +63,9 @@ class ScorerNode(GraphNode):
         if self._table is not None:
             self._table.append_trial(outcome)
             self._table_save.request()
+
+    def _on_interrupted(self, message: Header) -> None:
+        self._score.interrupt_trial(to_ns(message.stamp))
 
     def _publish_score(self, outcome: TrialOutcome) -> None:
         rates = self._score.rates()

@@ -27,6 +27,7 @@ class Phase(Enum):
     SHIFT = 'shift'
     SEARCH = 'search'
     HOME = 'home'
+    LOOK_AT = 'look_at'
 
 
 class Source(Enum):
@@ -87,6 +88,12 @@ class AttentionCycleConfig(Configuration):
     )
     home_pan_rad: float = parameter(0.0, 'home posture: pan', low=-3.15, high=3.15)
     home_tilt_rad: float = parameter(0.0, 'home posture: tilt', low=-1.57, high=1.57)
+    look_at_hold_s: float = parameter(
+        2.0,
+        'how long the head looks at a point of look_at, from its arrival on; each new point '
+        'counts from zero',
+        low=0.05, high=3600.0,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -153,6 +160,24 @@ class AttentionCycle:
         self._caregiver = None
         self._enter_phase(Phase.HOME)
 
+    @property
+    def is_interrupted(self) -> bool:
+        """Return whether the head follows a request from outside, and no trial."""
+        return self.phase in (Phase.HOME, Phase.LOOK_AT)
+
+    def look_at(self, direction: NDArray[np.float64]) -> None:
+        """End the trial, and look in a direction (2,) [rad] for `look_at_hold_s`."""
+        self._enter_phase(Phase.LOOK_AT)
+        self._target = direction
+
+    def end_look_at(self) -> bool:
+        """Look at the caregiver again; return whether the head looked at a point."""
+        if self.phase is not Phase.LOOK_AT:
+            return False
+        self._target = None
+        self._enter_phase(Phase.LOOK)
+        return True
+
     def restart(self) -> None:
         """End the trial (after a hold or a jump of the clock) and look at the caregiver again.
 
@@ -169,6 +194,7 @@ class AttentionCycle:
             Phase.SHIFT: self._step_shift,
             Phase.SEARCH: self._step_search,
             Phase.HOME: self._step_home,
+            Phase.LOOK_AT: self._step_look_at,
         }[self.phase]
         self._p_lm = self.gating.p_lm(self.trials, percept.log_evidence, percept.expected_gain)
         step(percept)
@@ -308,6 +334,10 @@ class AttentionCycle:
     def _step_home(self, percept: CycleInput) -> None:
         self._target = self._home_posture()
         if self._has_arrived(percept):
+            self._enter_phase(Phase.LOOK)
+
+    def _step_look_at(self, percept: CycleInput) -> None:
+        if self._elapsed_s(percept) >= self.config.look_at_hold_s:
             self._enter_phase(Phase.LOOK)
 
     def _home_posture(self) -> NDArray[np.float64]:

@@ -56,7 +56,8 @@ class CommandGuardConfig(Configuration):
         low=0.0, high=1.57,
     )  # fmt: skip
     latch_faults: bool = parameter(
-        False, 'after a hold wait for a call of `enable` (else: resume when the cause is gone)'
+        False,
+        'after a hold wait for a call of `gate/enable` (else: resume when the cause is gone)',
     )
 
 
@@ -237,7 +238,7 @@ class CommandGuard:
             # Do not push against what blocks the joint.
             self._target = self._measured
         if self._engaged and self.config.latch_faults and hold.cause is not Cause.DISABLED:
-            self._latched = replace(hold, text=f'{hold.text}; latched until enable is called')
+            self._latched = replace(hold, text=f'{hold.text}; latched until gate/enable is called')
         self._engaged = False
 
     def _find_hold(self) -> Hold | None:

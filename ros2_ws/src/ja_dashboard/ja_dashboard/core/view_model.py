@@ -26,6 +26,7 @@ _MOST_VALUES = 40
 _LONGEST_TEXT = 300
 _LONGEST_LINE = 4000
 _SOURCES = ('face', 'glance', 'VF', 'LM')
+_INTERRUPTIONS = ('home', 'look_at')
 _CURVE_POINTS = 200
 _ACTIVITIES = {
     ('look', ''): 'turning back to where the caregiver was',
@@ -34,6 +35,7 @@ _ACTIVITIES = {
     ('shift', 'LM'): 'turning to the predicted gaze target (learning module)',
     ('search', ''): 'searching for the caregiver',
     ('home', ''): 'turning home',
+    ('look_at', ''): 'looking at a point, as another node asks (look_at)',
 }
 """Texts by the phase and the source in the status of the gate."""
 _CURVE_EVERY_S = 1.0
@@ -173,9 +175,11 @@ class ViewModel:
 
     def record_gate_status(self, values: Mapping[str, str]) -> None:
         """Record the values of the gate's status; a trial ends when the phase of shifts does."""
-        if self.gate.get('phase') == 'shift' and values.get('phase') != 'shift':
-            source = self.gate.get('source') if self._fixated else 'none'
-            self.fixations[source if source in _SOURCES else 'none'] += 1
+        phase = values.get('phase')
+        if self.gate.get('phase') == 'shift' and phase != 'shift':
+            if phase not in _INTERRUPTIONS:
+                source = self.gate.get('source') if self._fixated else 'none'
+                self.fixations[source if source in _SOURCES else 'none'] += 1
             self._fixated = False
         # Only a status with a decision has a source; it stays until the next one.
         decision = {key: self.gate.get(key, '-') for key in ('source', 'p_lm')}
@@ -228,7 +232,10 @@ class ViewModel:
 
     def switches(self) -> dict[str, bool]:
         """Return the known switches, on or off, by the service that sets them."""
-        texts = {'enable': self.gate.get('enabled', ''), 'sim/pause': self._health_value('paused')}
+        texts = {
+            'gate/enable': self.gate.get('enabled', ''),
+            'sim/pause': self._health_value('paused'),
+        }
         return {service: text == 'True' for service, text in texts.items() if text}
 
     def facts(self) -> dict[str, str]:

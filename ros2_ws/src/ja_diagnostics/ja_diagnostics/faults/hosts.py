@@ -150,7 +150,7 @@ CASES = {'network': _network_cut, 'intruder': _intruder, 'segments': _full_of_de
 
 
 def start_intruder(host: int, for_s: float = _INTRUDER_S) -> subprocess.Popen[str]:
-    """Start a program on the far host that names the near one and calls its `enable` (false).
+    """Start a program on the far host that names the near one and calls its `gate/enable` (false).
 
     It prints one line of JSON after `for_s` [s], with the keys of `intruder.try_to_enter`.
     """

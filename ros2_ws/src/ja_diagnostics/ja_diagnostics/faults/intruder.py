@@ -1,7 +1,7 @@
 """`python -m ja_diagnostics.faults.intruder SECONDS`: what an uninvited host can do.
 
 It looks for all nodes that ROS_STATIC_PEERS and ROS_AUTOMATIC_DISCOVERY_RANGE lead to, and asks
-each service `enable` that it finds to hold the head.
+each service `gate/enable` that it finds to hold the head.
 """
 
 import json
@@ -37,7 +37,7 @@ def try_to_enter(for_s: float) -> dict[str, list[str]]:
             executor.spin_once(timeout_sec=0.1)
             nodes |= set(node.get_node_names()) - {node.get_name()}
             for name, types in node.get_service_names_and_types():
-                if name.endswith('/enable') and _TYPE in types and name not in clients:
+                if name.endswith('/gate/enable') and _TYPE in types and name not in clients:
                     clients[name] = node.create_client(SetBool, name)
             for name, client in clients.items():
                 if name not in answers and client.service_is_ready():

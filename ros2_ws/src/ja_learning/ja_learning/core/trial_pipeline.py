@@ -75,6 +75,7 @@ class TrialPipeline:
         self._log_evidence = 0.0
         self._mean_face = MeanFaceTracker(mean_face)
         self._attends = False
+        self._look_stamp_ns = -1
 
     def process_image(
         self,
@@ -115,6 +116,15 @@ class TrialPipeline:
         """Drop the trial under way."""
         self._trial.drop_trial()
 
+    def interrupt_trial(self, stamp_ns: int) -> None:
+        """Drop the trial under way if its look was at this stamp [ns] or before.
+
+        From that image on the head did not do what a trial asks for. A look that comes later
+        belongs to the next trial, whichever of the two is known first.
+        """
+        if self._look_stamp_ns <= stamp_ns:
+            self.drop_trial()
+
     def forget(self) -> None:
         """Drop the trial under way, and forget who is before the head."""
         self.drop_trial()
@@ -128,6 +138,7 @@ class TrialPipeline:
                 self._trial.observe_rest(here)
             return None
         given_up = self._trial.observe_look(look, here)
+        self._look_stamp_ns = posture.stamp_ns
         self._around.start_trial(here, self._log_evidence)
         return given_up
 

@@ -47,6 +47,10 @@ class Score:
     def __init__(self, window: int = 100) -> None:
         self._truth: TruthAt | None = None
         self._is_whole = False  # the present trial was observed from its beginning
+        self._began_ns = -1
+        self._fixated_ns: int | None = None
+        self._interrupted_ns: int | None = None  # the first time in the present trial
+        self._newest_interruption_ns = -1
         self._fixated: tuple[float, float] | None = None
         self._success = False
         self._recent: deque[bool] = deque(maxlen=window)
@@ -63,15 +67,36 @@ class Score:
         """
         ended = None
         if self._truth is not None and truth.trial != self._truth.trial:
-            if self._is_whole and truth.trial > self._truth.trial:
+            if truth.trial < self._truth.trial:
+                self._newest_interruption_ns = -1  # with the world its clock may be set back
+            elif self._is_whole and not self._is_interrupted():
                 ended = self._close(self._truth)
             self._is_whole, self._fixated, self._success = truth.trial > 0, None, False
+            self._began_ns, self._fixated_ns = truth.stamp_ns, None
+            newest_ns = self._newest_interruption_ns
+            self._interrupted_ns = newest_ns if newest_ns >= self._began_ns else None
         self._truth = truth
         if fixation is not None and self._fixated is None:
             nearest = int(np.argmin(angle_between(truth.directions, fixation)))
             self._fixated = (float(fixation[0]), float(fixation[1]))
+            self._fixated_ns = truth.stamp_ns
             self._success = nearest == truth.attended
         return ended
+
+    def interrupt_trial(self, stamp_ns: int) -> None:
+        """Do not count the trial to which the image of this stamp [ns] belongs.
+
+        From that image on the head did not do what a trial asks for. A trial with a fixation
+        is over for the robot, and counts. The image may be scored before or after this call.
+        """
+        self._newest_interruption_ns = stamp_ns
+        if self._interrupted_ns is None and stamp_ns >= self._began_ns:
+            self._interrupted_ns = stamp_ns
+
+    def _is_interrupted(self) -> bool:
+        if self._interrupted_ns is None:
+            return False
+        return self._fixated_ns is None or self._interrupted_ns < self._fixated_ns
 
     def rates(self) -> dict[str, Rate]:
         """Return rates by name: 'all', 'recent', 'in_view', 'out_of_view', and 'objects_N'."""
