@@ -28,7 +28,8 @@ MODULES = (
     'numpy.testing', 'numpy.typing', 'psutil', 'rich', 'rich.console', 'rich.live',
     'rich.markup', 'rich.panel', 'rich.progress', 'rich.table', 'rich.text', 'scipy',
     'scipy.integrate', 'scipy.linalg', 'scipy.ndimage', 'scipy.optimize', 'scipy.signal',
-    'scipy.spatial', 'scipy.spatial.transform', 'scipy.special', 'scipy.stats', 'typer',
+    'scipy.sparse', 'scipy.sparse.linalg', 'scipy.spatial', 'scipy.spatial.transform',
+    'scipy.special', 'scipy.stats', 'typer',
     'typer.core', 'typer.models', 'typer.testing', 'yaml',
 )  # fmt: skip
 # The OpenCV of a distribution is one compiled module, without the Python that its wheels add.
