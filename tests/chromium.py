@@ -1,9 +1,13 @@
 """Chromium without a window, for the tests of pages; docs/view.md says what they need."""
 
 import shutil
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -14,6 +18,20 @@ CHROMIUM, DRIVER = shutil.which('chromium'), shutil.which('chromedriver')
 needs_chromium = pytest.mark.skipif(
     not (CHROMIUM and DRIVER), reason='needs chromium and chromium-driver'
 )
+
+
+@contextmanager
+def served_page(folder: Path, *arguments: str) -> Iterator[str]:
+    """Run a `view` in a folder, with ROS arguments; give the address of its page in the block."""
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'ja_dashboard.view_node', *arguments],
+        cwd=folder, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert process.stdout is not None
+    yield process.stdout.readline().split('live page: ')[1].strip()
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0
 
 
 @contextmanager

@@ -27,8 +27,7 @@ ALLOWED = {
     'ja_common/core/run_folder.py': 'time.strftime',  # the name of a folder
     'ja_experiments/datasets/looks.py': 'time.strftime',  # the date of a data set
     # The date of a meeting.
-    'ja_caregiver/film_session_node.py': 'time.strftime',
-    'ja_caregiver/request_scorer_node.py': 'time.strftime',
+    'ja_caregiver/core/meeting_folder.py': 'time.strftime',
     'ja_recording/recorder_node.py': 'time.time_ns',  # the stamp of a message that brings none
     # The age of a stamp: it can be compared with the clock that stamps, and with no other.
     'ja_control/gate_node.py': 'self.get_clock().now().nanoseconds',

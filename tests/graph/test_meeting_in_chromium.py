@@ -5,7 +5,6 @@ JA_SCREENSHOTS=FOLDER keeps screenshots; those of a request are the pictures of 
 
 import ast
 import os
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -19,14 +18,14 @@ from selenium.webdriver.common.keys import Keys
 from std_srvs.srv import SetBool
 
 import fake_meeting
-from chromium import browsers, console_errors, needs_chromium, wait
+from chromium import browsers, console_errors, needs_chromium, served_page, wait
 from fake_meeting import MEASURED, STATES
 from ja_caregiver.core.meeting import Meeting, MeetingTrial, save_meeting
 from ja_caregiver.core.report import write_report
 from ja_common.executor import CachedWaitSetExecutor
 from ja_common.graph_node import GraphNode
 from ja_common.topics import CAREGIVER_REQUEST
-from ros_testing import PATIENCE_S, spin_until
+from ros_testing import spin_until
 
 pytestmark = [pytest.mark.slow, needs_chromium]
 
@@ -375,14 +374,8 @@ def test_the_end_leads_to_the_report(browser, meeting):
 @pytest.fixture
 def live_page(domain: int, tmp_path: Path) -> Iterator[str]:
     """Serve the page of a `view` in the test's domain; return its address."""
-    process = subprocess.Popen(
-        [sys.executable, '-m', 'ja_dashboard.view_node'],
-        cwd=tmp_path, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    yield process.stdout.readline().split('live page: ')[1].strip()
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 0
+    with served_page(tmp_path) as address:
+        yield address
 
 
 def test_a_scorer_of_the_graph_is_shown_and_paused(live_page, ros_context: Context, laptop):

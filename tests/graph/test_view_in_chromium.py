@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from nicegui import __version__
 
-from chromium import browsers, console_errors, needs_chromium, wait
+from chromium import browsers, console_errors, needs_chromium, served_page, wait
 from ros_testing import PATIENCE_S
 
 pytestmark = [pytest.mark.slow, needs_chromium]
@@ -79,15 +79,8 @@ def demo(request, domain: int, tmp_path: Path) -> Iterator[tuple[str, int]]:
 @pytest.fixture
 def page(request, domain: int, tmp_path: Path) -> Iterator[str]:
     """Serve the page on a host, without a graph; return its address."""
-    process = subprocess.Popen(
-        [sys.executable, '-m', 'ja_dashboard.view_node', '--ros-args', '-p',
-         f'host:={request.param}'],
-        cwd=tmp_path, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    yield process.stdout.readline().split('live page: ')[1].strip()
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 0
+    with served_page(tmp_path, '--ros-args', '-p', f'host:={request.param}') as address:
+        yield address
 
 
 @pytest.fixture

@@ -74,8 +74,8 @@ def orders(looks: Looks, monkeypatch: pytest.MonkeyPatch) -> list[LooksOrder]:
     monkeypatch.setattr(learning_speed, 'run_in_processes', here)
     monkeypatch.setattr(
         learning_speed,
-        'load_looks',
-        lambda scene, seed, count: looks[seed : seed + count],
+        'load_order',
+        lambda order: looks[order.seed : order.seed + order.count],
     )
     return made
 
@@ -108,7 +108,7 @@ def test_a_branch_continues_as_one_run_through_the_change_would() -> None:
         MeanFaceTracker(),
         np.random.default_rng([0, 3]),
     )
-    looks = learning_speed._load(of_same_person.looks(0))
+    looks = learning_speed.load_order(of_same_person.looks(0))
     run.learn(looks, range(26), (8,))
     for index in range(learning_speed._WATCHED):
         run.watch(looks, index)

@@ -49,8 +49,8 @@ def orders(monkeypatch: pytest.MonkeyPatch) -> list[LooksOrder]:
     )
     monkeypatch.setattr(
         photo_caregivers,
-        'load_looks',
-        lambda scene, seed, count, senses, photo: looks[seed : seed + count],
+        'load_order',
+        lambda order: looks[order.seed : order.seed + order.count],
     )
     return made
 

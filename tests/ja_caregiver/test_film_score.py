@@ -7,7 +7,7 @@ import pytest
 
 from ja_caregiver.core.film_score import FilmImage, FilmScore
 from ja_caregiver.core.film_session import SessionPhase
-from ja_caregiver.core.requests import RequestPhase
+from ja_common.core.request_phase import RequestPhase
 
 THINGS = {1: (0.4, 0.1), 2: (-0.3, 0.1)}
 FACE, ONE, TWO = np.array([0.0, 0.0]), np.array(THINGS[1]), np.array(THINGS[2])

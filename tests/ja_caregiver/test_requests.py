@@ -10,8 +10,8 @@ from ja_caregiver.core.requests import (
     MeetingImage,
     RequestConfig,
     RequestCourse,
-    RequestPhase,
 )
+from ja_common.core.request_phase import RequestPhase
 
 THINGS = {1: (0.3, 0.1), 2: (0.0, 0.15), 3: (-0.3, 0.1)}
 PERIOD_NS = 10**8

@@ -9,9 +9,9 @@ import pytest
 from fake_meeting import MEASURED, STATES, meeting
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.lens import Lens
+from ja_common.core.request_phase import RequestPhase
 from ja_dashboard.core.meeting_view import (
     LearnerFigure,
-    MeetingPhase,
     MeetingView,
     NumberedThing,
     marks_in_picture,
@@ -24,7 +24,7 @@ ODD = ['', ' ', 'x', '-1', '1.5', 'nan', 'inf', '１', '1e3', '9' * 5000, '\0', 
 
 def test_all_that_the_scorer_states_is_read():
     view = meeting('wrong')
-    assert (view.phase, view.number, view.answer, view.right) == (MeetingPhase.ANSWER, 4, 2, False)
+    assert (view.phase, view.number, view.answer, view.right) == (RequestPhase.ANSWER, 4, 2, False)
     assert (view.trial, view.trials, view.successes, view.chance) == (24, 40, 17, 0.2)
     assert view.learner == LearnerFigure(17, 23, (0.5353, 0.8745))
     assert view.things[1] == NumberedThing(2, (-0.03, 0.22))
@@ -33,7 +33,7 @@ def test_all_that_the_scorer_states_is_read():
 
 @pytest.mark.parametrize('state', STATES)
 def test_each_phase_is_known(state):
-    assert meeting(state).phase is not MeetingPhase.STARTING or state == 'starting'
+    assert meeting(state).phase is not RequestPhase.STARTING or state == 'starting'
 
 
 def test_what_is_missing_is_none():
@@ -87,7 +87,7 @@ def test_things_are_read_as_far_as_they_go(text, numbers):
 def test_odd_words_are_no_phase_and_no_verdict():
     view = MeetingView.of('m' * 9999, {'phase': '<b>', 'right': 'yes', 'chance': '2', 'film': 'x'})
     assert (view.phase, view.right, view.chance, view.film) == (
-        MeetingPhase.STARTING,
+        RequestPhase.STARTING,
         None,
         None,
         False,
@@ -97,8 +97,8 @@ def test_odd_words_are_no_phase_and_no_verdict():
 
 def test_a_meeting_is_silent_unless_it_has_ended():
     assert not meeting('thing').is_silent
-    assert MeetingView(MeetingPhase.THING, silent_s=9.0).is_silent
-    assert not MeetingView(MeetingPhase.ENDED, silent_s=9.0).is_silent
+    assert MeetingView(RequestPhase.THING, silent_s=9.0).is_silent
+    assert not MeetingView(RequestPhase.ENDED, silent_s=9.0).is_silent
 
 
 def marks(*directions, posture=(0.0, 0.0), camera=CAMERA):

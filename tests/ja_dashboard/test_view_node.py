@@ -27,6 +27,7 @@ from ja_common.core.config import Configuration, parameter
 from ja_common.core.detection import Detection, Kind
 from ja_common.core.face_gaze import FaceGaze
 from ja_common.core.health import Level
+from ja_common.core.request_phase import RequestPhase
 from ja_common.detection_codec import encode_detections
 from ja_common.face_gaze_codec import encode_face_gaze
 from ja_common.graph_node import GraphNode
@@ -53,7 +54,7 @@ from ja_common.topics import (
     WEIGHT_FILES,
 )
 from ja_common.weight_files_codec import encode_weight_files
-from ja_dashboard.core.meeting_view import MeetingPhase, NumberedThing
+from ja_dashboard.core.meeting_view import NumberedThing
 from ja_dashboard.core.view_model import RunState
 from ja_dashboard.view_node import ViewNode
 from node_bench import header, joint_state
@@ -468,7 +469,7 @@ def test_a_meeting_is_shown_without_a_viewer_and_grows_silent(make_bench):
     bench.publish(CAREGIVER_REQUEST, asked)
     bench.wait(lambda: bench.node.frame.meeting)
     meeting = bench.node.frame.meeting
-    assert (meeting.phase, meeting.number) == (MeetingPhase.THING, 3)
+    assert (meeting.phase, meeting.number) == (RequestPhase.THING, 3)
     assert meeting.message == 'Look at thing 3.'
     assert meeting.things == (NumberedThing(3, (0.2, -0.1)),)
     bench.node._request_s -= 10.0

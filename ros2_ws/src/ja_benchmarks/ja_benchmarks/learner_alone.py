@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from ja_common.core.face_gaze import FaceGaze
 from ja_experiments.datasets.looks import Looks, LooksOrder, load_looks
 from ja_experiments.processes import run_in_processes
-from ja_learning.core.learner import Predictor
+from ja_learning.core.learner import Learner, Predictor
+from ja_learning.core.mean_face import MeanFaceTracker
 from ja_learning.core.trial import Look, MeanFace, Trial, unknown_ranges
 
 TRIALS, TEST_LOOKS = 600, 250
@@ -128,6 +129,25 @@ def draw_test(
         yield from asked if depth else (replace(each, look=asked[0].look) for each in asked)
 
 
+def practise(
+    learner: Learner,
+    tracker: MeanFaceTracker,
+    rng: np.random.Generator,
+    looks: Looks,
+    index: int,
+    objects: int,
+    depth: float | None = None,
+) -> MeanFace:
+    """Let a learner learn from one of the looks; return her mean face, as far as it is known.
+
+    `depth`: as in `draw_question`.
+    """
+    mean_face = tracker.observe(looks.faces[index], begins_look=True)
+    question = draw_question(rng, looks, index, objects, depth, mean_face=mean_face)
+    learner.update(question.trial(rng))
+    return mean_face
+
+
 def success(learner: Predictor, questions: Iterable[Question]) -> float:
     """Return how often the learner alone chooses the attended object, 0-1.
 
@@ -149,8 +169,13 @@ def render_looks(orders: Iterable[LooksOrder]) -> None:
     run_in_processes('looks', _render_order, [(order,) for order in dict.fromkeys(orders)])
 
 
+def load_order(order: LooksOrder) -> Looks:
+    """Return the looks of an order, rendered if they are not cached."""
+    return load_looks(order.scene, order.seed, order.count, senses=order.senses, photo=order.photo)
+
+
 def _render_order(order: LooksOrder) -> None:
-    load_looks(order.scene, order.seed, order.count, senses=order.senses, photo=order.photo)
+    load_order(order)
 
 
 def next_seed(seeds: range, seed: int) -> int:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ja_benchmarks.learner_alone import draw_question, draw_test, success
+from ja_benchmarks.learner_alone import draw_test, practise, success
 from ja_common.core.config import ConfigError
 from ja_experiments.datasets.looks import Looks
 from ja_experiments.datasets.stills import load_stills
@@ -27,8 +27,8 @@ def score_stills(
     """Print and return the success of the learner alone, 0-1, after `TRIALS`, by person.
 
     For each person the learner starts from initial weights. Stills in which she looks into the
-    camera are left out. It learns without labels from a part
-    of her stills, drawn again and again with other things around, and is tested on the others.
+    camera are left out. It learns without labels from a part of her stills, drawn again and again
+    with other things around, and is tested on the others.
     Raises ConfigError where no person has enough stills.
     """
     found: dict[str, dict[int, float]] = {}
@@ -65,9 +65,7 @@ def learning_curve(
     curve: dict[int, float] = {}
     for trial in range(1, max(trials) + 1):
         index = int(rng.integers(len(learned)))
-        mean_face = tracker.observe(learned.faces[index], begins_look=True)
-        question = draw_question(rng, learned, index, OBJECTS, mean_face=mean_face)
-        learner.update(question.trial(rng))
+        mean_face = practise(learner, tracker, rng, learned, index, OBJECTS)
         if trial in trials:
             test = draw_test(tested, OBJECTS, seed, mean_face=mean_face)
             curve[trial] = success(learner.snapshot(), test)

@@ -1,10 +1,11 @@
 """A meeting with a person: the graph runs until all requests were made, then its figures."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from ja_caregiver.core.meeting import MEETING_FILE, Meeting, load_meeting
+from ja_caregiver.core.meeting_folder import write_report
 from ja_common.core.config import ConfigError
 from ja_runner.node_spec import NodeSpec
 from ja_runner.progress import ProgressNode
@@ -104,7 +105,7 @@ def print_end(folder: Path, code: int) -> int:
         return code or 1
     lines = summary(meeting)
     try:
-        lines.append(f'report: {_report_writer()(meeting, folder)}')
+        lines.append(f'report: {write_report(meeting, folder)}')
     except (OSError, ConfigError) as error:
         lines.append(f'error: {error}')
         code = code or 1
@@ -128,10 +129,3 @@ def summary(meeting: Meeting) -> list[str]:
         numbers = ', '.join(f'{trial.trial} (thing {trial.asked})' for trial in missed)
         lines.append(f'missed: {numbers}')
     return [*lines, f'track of the learner: {meeting.track}'] if meeting.track else lines
-
-
-def _report_writer() -> Callable[[Meeting, Path], Path]:
-    # Imported late: it is needed once, at the end.
-    from ja_caregiver.core.report import write_report
-
-    return write_report

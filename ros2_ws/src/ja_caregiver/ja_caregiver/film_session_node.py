@@ -24,9 +24,8 @@ from ja_caregiver.core.film_clips import Clip, ClipReader, directions_of_places
 from ja_caregiver.core.film_score import FilmImage, FilmScore
 from ja_caregiver.core.film_session import FilmSession, FilmSessionConfig, SessionPhase
 from ja_caregiver.core.meeting import Meeting, MeetingTrial
-from ja_caregiver.core.meeting_folder import MeetingFolder, crop_around
+from ja_caregiver.core.meeting_folder import MeetingFolder, crop_around, new_meeting, write_report
 from ja_caregiver.core.numbered_things import Direction
-from ja_caregiver.core.requests import RequestPhase
 from ja_caregiver.core.schedule import ScheduledLook, load_schedule
 from ja_caregiver.request_codec import encode_request
 from ja_common.camera_info_codec import encode_camera_info
@@ -35,9 +34,11 @@ from ja_common.core.detection import Detection, caregiver_face
 from ja_common.core.geometry import directions_of_rays
 from ja_common.core.health import Level
 from ja_common.core.posture import STILL_BELOW_RAD_S, Posture
+from ja_common.core.request_phase import RequestPhase
 from ja_common.core.stamps import NS_PER_S
 from ja_common.detection_codec import decode_detections
 from ja_common.graph_node import GraphNode
+from ja_common.head_description import CAMERA_FRAME
 from ja_common.image_codec import encode_image
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.node_main import spin_node
@@ -63,7 +64,6 @@ from ja_perception.core.frame_sources import SourceError, SourceOptions
 from ja_perception.core.open_source import open_source
 from ja_sim.core.digital_head import DigitalHead, DigitalHeadConfig
 
-CAMERA_FRAME = 'camera_optical_frame'
 _START_NS = NS_PER_S  # a stamp of zero means 'no time' in ROS
 _FASTEST_FILM_HZ = 1000.0
 _SHRUNK_ABOVE = 1.5
@@ -154,11 +154,10 @@ class FilmSessionNode(GraphNode):
             # An OSError ends the node with this one sentence.
             raise OSError(f"film '{config.film}': {error}") from None
         self._score = FilmScore(len(self._looks), config.fixated_within_rad)
-        started = time.strftime('%Y-%m-%dT%H:%M:%S%z')
-        self._meeting = Meeting(started, 'film', config.seed, config.learner)
+        self._meeting = new_meeting('film', config.seed, config.learner)
         self._folder: MeetingFolder | None = None
         if config.folder:
-            self._folder = MeetingFolder(Path(config.folder).expanduser(), _write_report)
+            self._folder = MeetingFolder(Path(config.folder).expanduser(), write_report)
             self._save = ReportedSave(self, 'folder', self._folder.save)
         self._pictures: dict[str, str] = {}
         self._face: tuple[NDArray[np.uint8], Detection] | None = None
@@ -392,13 +391,6 @@ class FilmSessionNode(GraphNode):
 
     def _on_rearranged(self, _: Trigger.Request, response: Trigger.Response) -> Any:
         raise ValueError('in a film the schedule states when things are moved')
-
-
-def _write_report(meeting: Meeting, folder: Path) -> Path:
-    # Imported late: it is needed once, at the end.
-    from ja_caregiver.core.report import write_report
-
-    return write_report(meeting, folder)
 
 
 def main(args: Sequence[str] | None = None) -> None:

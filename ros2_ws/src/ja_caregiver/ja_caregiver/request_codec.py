@@ -6,8 +6,9 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from ja_caregiver.core.meeting import Meeting, MeetingTrial
 from ja_caregiver.core.numbered_things import Direction
-from ja_caregiver.core.requests import RequestConfig, RequestPhase
+from ja_caregiver.core.requests import RequestConfig
 from ja_common.core.health import Level
+from ja_common.core.request_phase import RequestPhase
 
 _WITH_ANSWER = (RequestPhase.ANSWER, RequestPhase.CAMERA, RequestPhase.REARRANGE)
 

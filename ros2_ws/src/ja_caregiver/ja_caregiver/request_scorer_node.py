@@ -5,7 +5,6 @@ learns, moves or sees subscribes to it.
 """
 
 import re
-import time
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +20,12 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from ja_caregiver.core.meeting import MEETING_FILE, Meeting, MeetingTrial, load_meeting
-from ja_caregiver.core.meeting_folder import MeetingFolder, crop_around
+from ja_caregiver.core.meeting_folder import (
+    MeetingFolder,
+    crop_around,
+    new_meeting,
+    write_report,
+)
 from ja_caregiver.core.numbered_things import Direction, NumberedThings, NumberedThingsConfig
 from ja_caregiver.core.request_draw import RequestDraw
 from ja_caregiver.core.requests import GateState, MeetingImage, RequestConfig, RequestCourse
@@ -94,7 +98,7 @@ class RequestScorerNode(GraphNode):
         self._hold = HeadHold(self)
         self._folder: MeetingFolder | None = None
         if config.folder:
-            self._folder = MeetingFolder(Path(config.folder).expanduser(), _write_report)
+            self._folder = MeetingFolder(Path(config.folder).expanduser(), write_report)
             self._save = ReportedSave(self, 'folder', self._folder.save)
 
         Synchroniser(self, self._joints).call_with(
@@ -277,8 +281,7 @@ def _meeting_so_far(config: RequestScorerConfig) -> Meeting:
             return replace(load_meeting(path), ended='')
         except ValueError as error:
             raise ConfigError(f'folder: {error}') from None
-    started = time.strftime('%Y-%m-%dT%H:%M:%S%z')
-    return Meeting(started, config.source, config.seed, config.learner)
+    return new_meeting(config.source, config.seed, config.learner)
 
 
 def _gate_state(values: Mapping[str, str]) -> GateState:
@@ -291,13 +294,6 @@ def _gate_state(values: Mapping[str, str]) -> GateState:
 
 def _pair(direction: NDArray[np.float64] | None) -> Direction | None:
     return None if direction is None else (float(direction[0]), float(direction[1]))
-
-
-def _write_report(meeting: Meeting, folder: Path) -> Path:
-    # Imported late: it is needed once, at the end.
-    from ja_caregiver.core.report import write_report
-
-    return write_report(meeting, folder)
 
 
 def main(args: Sequence[str] | None = None) -> None:

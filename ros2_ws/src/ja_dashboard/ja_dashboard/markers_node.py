@@ -20,6 +20,7 @@ from ja_common.core.health import Level
 from ja_common.core.posture import Posture
 from ja_common.face_gaze_codec import decode_face_gaze
 from ja_common.graph_node import GraphNode
+from ja_common.head_description import BASE_FRAME
 from ja_common.joint_codec import JointCodec, JointConfig
 from ja_common.node_main import spin_node
 from ja_common.polled_subscription import PolledSubscription
@@ -58,7 +59,7 @@ class MarkersConfig(Configuration):
     """Where and how often it is drawn."""
 
     base_frame: str = parameter(
-        'base_link', 'frame of all markers: x forward at pan 0, the camera in its origin'
+        BASE_FRAME, 'frame of all markers: x forward at pan 0, the camera in its origin'
     )
     nominal_distance_m: float = parameter(
         1.0, 'where a direction ends of which no range is known [m]', low=0.05, high=100.0

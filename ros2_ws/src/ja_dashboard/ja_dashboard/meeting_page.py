@@ -11,7 +11,8 @@ from typing import Any, Protocol
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from ja_dashboard.core.meeting_view import MeetingPhase, MeetingView, marks_in_picture, report_file
+from ja_common.core.request_phase import RequestPhase
+from ja_dashboard.core.meeting_view import MeetingView, marks_in_picture, report_file
 
 MEETING_URL = '/meet'
 FULL_VIEW_URL = '/view'
@@ -120,7 +121,7 @@ def _picture_of(frame: Any, meeting: MeetingView) -> dict[str, Any]:
 
 def _report_of(meeting: MeetingView) -> dict[str, str]:
     """Return the address of the report, '' if it lies on another machine, and its path."""
-    if meeting.phase is not MeetingPhase.ENDED or not meeting.report:
+    if meeting.phase is not RequestPhase.ENDED or not meeting.report:
         return {'address': '', 'path': ''}
     address = REPORT_URL if report_file(meeting.report) else ''
     return {'address': address, 'path': meeting.report}

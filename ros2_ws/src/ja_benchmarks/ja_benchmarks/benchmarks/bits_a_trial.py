@@ -38,7 +38,7 @@ from ja_benchmarks.ideal_learner import (
     probabilities,
     read_heads,
 )
-from ja_benchmarks.learner_alone import LOOKS, draw_question, draw_test, render_looks, success
+from ja_benchmarks.learner_alone import LOOKS, draw_test, practise, render_looks, success
 from ja_benchmarks.rows import Row, mean_row, success_row
 from ja_experiments.datasets.looks import Looks, LooksOrder, load_looks
 from ja_experiments.processes import run_in_processes
@@ -102,11 +102,7 @@ def learned(task: SensesTask, seed: int) -> NDArray[np.float64]:
     tracker, mean_face, found = MeanFaceTracker(), None, []
     for trial in range(max(task.marks) + 1):
         if trial:
-            mean_face = tracker.observe(looks.faces[trial - 1], begins_look=True)
-            question = draw_question(
-                rng, looks, trial - 1, task.objects, task.depth, mean_face=mean_face
-            )
-            learner.update(question.trial(rng))
+            mean_face = practise(learner, tracker, rng, looks, trial - 1, task.objects, task.depth)
         if trial in task.marks:
             belief = learner.snapshot()
             assert isinstance(belief, GazeLineBelief)

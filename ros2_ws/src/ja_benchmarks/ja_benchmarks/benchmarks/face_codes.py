@@ -14,9 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ja_benchmarks.learner_alone import draw_question, draw_test, render_looks, success
+from ja_benchmarks.learner_alone import (
+    draw_test,
+    load_order,
+    practise,
+    render_looks,
+    success,
+)
 from ja_benchmarks.rows import Row, success_row
-from ja_experiments.datasets.looks import IMAGE_SIZE, Looks, LooksOrder, load_looks
+from ja_experiments.datasets.looks import IMAGE_SIZE, Looks, LooksOrder
 from ja_experiments.face_codes import code_of_others, code_of_watching
 from ja_experiments.processes import run_in_processes
 from ja_learning.core.face_code import OTHERS, WATCHED, save_face_code
@@ -70,9 +76,7 @@ def curve(guess: str, folder: Path, seed: int) -> list[float]:
     learner = make_learner('gaze_line', seed, GazeLineConfig(first_guess=guess, face_code=code))
     rng, tracker, found = np.random.default_rng([seed, OBJECTS]), MeanFaceTracker(), []
     for trial in range(max(MARKS)):
-        mean_face = tracker.observe(looks.faces[trial], begins_look=True)
-        question = draw_question(rng, looks, trial, OBJECTS, mean_face=mean_face)
-        learner.update(question.trial(rng))
+        mean_face = practise(learner, tracker, rng, looks, trial, OBJECTS)
         if trial + 1 in MARKS:
             test = draw_test(looks[-TEST_LOOKS:], OBJECTS, seed, mean_face=mean_face)
             found.append(success(learner.snapshot(), test))
@@ -101,5 +105,4 @@ def _order(seed: int) -> LooksOrder:
 
 
 def _looks(seed: int) -> Looks:
-    order = _order(seed)
-    return load_looks(order.scene, order.seed, order.count)
+    return load_order(_order(seed))

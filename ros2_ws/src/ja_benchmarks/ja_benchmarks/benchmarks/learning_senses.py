@@ -25,9 +25,9 @@ from ja_benchmarks.learner_alone import (
     TEST_LOOKS,
     TRIALS,
     Question,
-    draw_question,
     draw_test,
     next_seed,
+    practise,
     render_looks,
     success,
 )
@@ -109,9 +109,7 @@ def curve(condition: SensesTask, seed: int) -> list[float]:
             found.append(success(learner.snapshot(), _test(others, condition, seed)))
         world = others if changed else looks
         index = (trial - 1 - (condition.change_at if changed else 0)) % TRIALS
-        mean_face = tracker.observe(world.faces[index], begins_look=True)
-        question = draw_question(rng, world, index, objects, depth, mean_face=mean_face)
-        learner.update(question.trial(rng))
+        mean_face = practise(learner, tracker, rng, world, index, objects, depth)
         if trial in condition.marks and not (changed and trial == condition.change_at + 1):
             test = _test(world, condition, seed, mean_face)
             found.append(success(learner.snapshot(), test))

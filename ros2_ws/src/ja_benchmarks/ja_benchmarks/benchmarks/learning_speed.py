@@ -25,12 +25,13 @@ from ja_benchmarks.learner_alone import (
     TRIALS,
     draw_question,
     draw_test,
+    load_order,
     next_seed,
     render_looks,
     success,
 )
 from ja_benchmarks.rows import Row, success_row
-from ja_experiments.datasets.looks import POOL, Looks, LooksOrder, load_looks
+from ja_experiments.datasets.looks import POOL, Looks, LooksOrder
 from ja_experiments.processes import run_in_processes
 from ja_learning.core.learner import Learner
 from ja_learning.core.learner_registry import make_learner
@@ -153,12 +154,12 @@ def curves(plan: LearningPlan, task: LearningTask, seed: int) -> dict[str, float
     """Return the success of one learner alone, 0-1, after each mark of a task and its changes."""
     rng = np.random.default_rng([seed, task.objects])
     run = _LearningRun(plan, task, seed, make_learner(task.kind, seed), MeanFaceTracker(), rng)
-    looks = _load(plan.looks(seed))
+    looks = load_order(plan.looks(seed))
     shares = run.learn(looks, range(plan.trials), task.marks)
     found = {f'{task.kind}, {task.name}: {mark} trials': each for mark, each in shares.items()}
     for change in task.changes:
         name = f'{task.kind}, {task.name}, {change.name} after {max(task.marks)}'
-        branch, elsewhere = run.branch(), _load(plan.looks_after(change, seed))
+        branch, elsewhere = run.branch(), load_order(plan.looks_after(change, seed))
         for index in range(_WATCHED):
             branch.watch(elsewhere, index)
         shares = branch.learn(elsewhere, range(_WATCHED, len(elsewhere)), change.marks)
@@ -215,7 +216,3 @@ class _LearningRun:
         learner.restore(self.learner.state())
         mean_face, rng = copy.deepcopy(self.mean_face), copy.deepcopy(self.rng)
         return replace(self, learner=learner, mean_face=mean_face, rng=rng)
-
-
-def _load(order: LooksOrder) -> Looks:
-    return load_looks(order.scene, order.seed, order.count)

@@ -21,13 +21,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ja_benchmarks.learner_alone import draw_question, draw_test, render_looks, success
+from ja_benchmarks.learner_alone import (
+    draw_test,
+    load_order,
+    practise,
+    render_looks,
+    success,
+)
 from ja_benchmarks.package_pictures import package_frame, package_picture
 from ja_benchmarks.rows import Row, share_row, success_row
 from ja_caregiver.core.photo_face import PhotoFaceFinder
 from ja_caregiver.core.photo_head import photo_head
 from ja_common.core.cache import cache_folder
-from ja_experiments.datasets.looks import Looks, LooksOrder, load_looks
+from ja_experiments.datasets.looks import Looks, LooksOrder
 from ja_experiments.processes import run_in_processes
 from ja_learning.core.gaze_line_config import GazeLineConfig
 from ja_learning.core.learner import Learner
@@ -205,12 +211,12 @@ def curve(plan: PhotoPlan, person: Person, reader: str, objects: int, seed: int)
     """Return the success of one learner alone after each mark, 0-1."""
     cv2.setNumThreads(1)
     rng = np.random.default_rng([seed, objects])
-    looks = _load(plan.of_person(person))
+    looks = load_order(plan.of_person(person))
     learner, tracker, found = _learner(reader, seed), MeanFaceTracker(), []
     marks = plan.marks[objects]
     for trial in range(1, max(marks) + 1):
         index = (trial - 1) % plan.trials
-        _teach(learner, tracker, rng, looks, index, objects)
+        practise(learner, tracker, rng, looks, index, objects)
         if trial in marks:
             found.append(_test(learner, tracker, looks[-plan.test_looks :], objects, seed))
     return found
@@ -222,12 +228,12 @@ def at_once(plan: PhotoPlan, reader: str, objects: int, seed: int) -> list[float
     rng = np.random.default_rng([seed, objects])
     learner, tracker = _learner(reader, seed), MeanFaceTracker()
     for sim_seed in plan.sim_seeds:
-        looks = _load(plan.of_sim(sim_seed))
+        looks = load_order(plan.of_sim(sim_seed))
         for index in range(plan.trials):
-            _teach(learner, tracker, rng, looks, index, objects)
+            practise(learner, tracker, rng, looks, index, objects)
     found = []
     for person in plan.people:
-        looks = _load(plan.of_person(person))
+        looks = load_order(plan.of_person(person))
         watched = copy.deepcopy(tracker)
         for index in range(_WATCHED):
             watched.observe(looks.faces[index], begins_look=True)
@@ -239,26 +245,9 @@ def _learner(reader: str, seed: int) -> Learner:
     return make_learner('gaze_line', seed, GazeLineConfig(face_reader=reader))
 
 
-def _teach(
-    learner: Learner,
-    tracker: MeanFaceTracker,
-    rng: np.random.Generator,
-    looks: Looks,
-    index: int,
-    objects: int,
-) -> None:
-    mean_face = tracker.observe(looks.faces[index], begins_look=True)
-    question = draw_question(rng, looks, index, objects, mean_face=mean_face)
-    learner.update(question.trial(rng))
-
-
 def _test(
     learner: Learner, tracker: MeanFaceTracker, looks: Looks, objects: int, seed: int
 ) -> float:
     """Return the success of the learner alone as it is now, 0-1; nothing is learned."""
     mean_face = copy.deepcopy(tracker).observe(looks.faces[0], begins_look=True)
     return success(learner.snapshot(), draw_test(looks, objects, seed, mean_face=mean_face))
-
-
-def _load(order: LooksOrder) -> Looks:
-    return load_looks(order.scene, order.seed, order.count, senses=order.senses, photo=order.photo)

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ja_caregiver.core.film_session import SessionPhase
 from ja_caregiver.core.meeting import MeetingTrial
 from ja_caregiver.core.numbered_things import Direction, nearest_thing
-from ja_caregiver.core.requests import RequestConfig, RequestPhase
+from ja_caregiver.core.requests import RequestConfig
+from ja_common.core.request_phase import RequestPhase
 
 _CHANGED_RAD = 0.01
 _LEARNER, _VISUAL_FEEDBACK = 'learner', 'visual feedback'

@@ -1,6 +1,7 @@
 """The folder of a meeting: its file, its pictures and its report, written by another thread."""
 
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,6 +19,19 @@ _QUALITY = 80
 _MOST_WAITING = 200
 
 ReportWriter = Callable[[Meeting, Path], Path]
+
+
+def new_meeting(source: str, seed: int, learner: str) -> Meeting:
+    """Return a meeting that starts now."""
+    return Meeting(time.strftime('%Y-%m-%dT%H:%M:%S%z'), source, seed, learner)
+
+
+def write_report(meeting: Meeting, folder: Path) -> Path:
+    """Write the report of a meeting; return its file. SaveError."""
+    # Imported late: it is needed once, at the end.
+    from ja_caregiver.core.report import write_report as write
+
+    return write(meeting, folder)
 
 
 class MeetingFolder:

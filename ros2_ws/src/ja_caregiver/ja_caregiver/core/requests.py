@@ -7,11 +7,11 @@ head shifts, and the robot needs to know nothing of any request.
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
-from enum import Enum
 
 from ja_caregiver.core.meeting import MeetingTrial
 from ja_caregiver.core.numbered_things import Direction, nearest_thing
 from ja_common.core.config import Configuration, parameter
+from ja_common.core.request_phase import RequestPhase
 from ja_common.core.stamps import NS_PER_S
 
 LOOKING = ('look', 'search', 'home')
@@ -22,19 +22,6 @@ _SHIFTING, _LEARNER = 'shift', 'LM'
 _FIXATION_WITHIN_S = 0.5
 # Where requests start later in a look than after the answer, too little of it would be left.
 _LATE_AFTER_S = 0.3
-
-
-class RequestPhase(Enum):
-    """What the meeting waits for."""
-
-    STARTING = 'starting'
-    NO_PERSON = 'no_person'
-    CAMERA = 'camera'
-    THING = 'thing'
-    ANSWER = 'answer'
-    REARRANGE = 'rearrange'
-    PAUSED = 'paused'
-    ENDED = 'ended'
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ja_common.core.camera_model import CameraModel
 from ja_common.core.geometry import rays_of_directions
+from ja_common.core.request_phase import RequestPhase
 
 SILENT_AFTER_S = 3.0
 """The scorer counts as silent after this time [s]: it publishes at 2 Hz."""
@@ -31,19 +31,6 @@ _INSET = 0.06
 _GAP = 0.13
 """Least distance between two such marks at one edge, in parts of the picture."""
 _SAME_RAY = 0.02
-
-
-class MeetingPhase(Enum):
-    """What happens in a meeting, under the names in the scorer's messages."""
-
-    STARTING = 'starting'
-    NO_PERSON = 'no_person'
-    CAMERA = 'camera'
-    THING = 'thing'
-    ANSWER = 'answer'
-    REARRANGE = 'rearrange'
-    PAUSED = 'paused'
-    ENDED = 'ended'
 
 
 @dataclass(frozen=True)
@@ -72,7 +59,7 @@ class MeetingView:
     scorer. `silent_s`: since the message.
     """
 
-    phase: MeetingPhase = MeetingPhase.STARTING
+    phase: RequestPhase = RequestPhase.STARTING
     message: str = ''
     number: int | None = None
     trial: int | None = None
@@ -109,7 +96,7 @@ class MeetingView:
     @property
     def is_silent(self) -> bool:
         """Return whether the scorer should have published since; one that has ended need not."""
-        return self.phase is not MeetingPhase.ENDED and self.silent_s > SILENT_AFTER_S
+        return self.phase is not RequestPhase.ENDED and self.silent_s > SILENT_AFTER_S
 
 
 @dataclass(frozen=True)
@@ -162,8 +149,8 @@ def report_file(text: str) -> Path | None:
         return None
 
 
-def _phase(text: str) -> MeetingPhase:
-    return next((phase for phase in MeetingPhase if phase.value == text), MeetingPhase.STARTING)
+def _phase(text: str) -> RequestPhase:
+    return next((phase for phase in RequestPhase if phase.value == text), RequestPhase.STARTING)
 
 
 def _count(text: str | None) -> int | None:
